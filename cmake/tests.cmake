@@ -1,0 +1,16 @@
+# Documents are tested against the built tools. Tests with a ROS master run one at a time: they hold
+# the node to what it does in real time.
+if(NOT CATKIN_ENABLE_TESTING)
+  return()
+endif()
+add_test(NAME ${PROJECT_NAME}_documents
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/documents/documents_test.py)
+set_tests_properties(${PROJECT_NAME}_documents PROPERTIES ENVIRONMENT
+  AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+
+get_property(tests DIRECTORY PROPERTY TESTS)
+foreach(test ${tests})
+  if(test MATCHES "_rostest_")
+    set_tests_properties(${test} PROPERTIES RUN_SERIAL TRUE)
+  endif()
+endforeach()

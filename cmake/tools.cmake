@@ -1,0 +1,30 @@
+# What the tools share. Of the ROS layer they need how messages are read and frames are drawn.
+file(GLOB tool_common_sources CONFIGURE_DEPENDS src/tools/common/*.cpp)
+add_library(ams_tools STATIC ${tool_common_sources} src/ros/debug_image.cpp
+  src/ros/image_conversions.cpp)
+target_include_directories(ams_tools SYSTEM PUBLIC ${catkin_INCLUDE_DIRS})
+target_link_libraries(ams_tools PUBLIC ${PROJECT_NAME} ${catkin_LIBRARIES} ${Boost_LIBRARIES})
+
+# One executable a file of src/tools, named after it.
+file(GLOB tool_sources CONFIGURE_DEPENDS src/tools/*.cpp)
+foreach(source ${tool_sources})
+  get_filename_component(tool ${source} NAME_WE)
+  add_executable(${tool} ${source})
+  target_include_directories(${tool} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  target_link_libraries(${tool} ams_tools)
+  set_target_properties(${tool} PROPERTIES
+    RUNTIME_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+  install(TARGETS ${tool} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endforeach()
+
+if(CATKIN_ENABLE_TESTING)
+  file(GLOB tool_tests CONFIGURE_DEPENDS test/tools/*_test.cpp)
+  catkin_add_gtest(test_tools ${tool_tests} TIMEOUT 900
+    WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/test)
+  target_include_directories(test_tools PRIVATE src)
+  target_include_directories(test_tools SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  target_compile_definitions(test_tools PRIVATE TRACK_BAG="$<TARGET_FILE:track_bag>"
+    IMAGES_TO_BAG="$<TARGET_FILE:images_to_bag>")
+  target_link_libraries(test_tools ams_tools gtest_main)
+  add_dependencies(test_tools track_bag images_to_bag)
+endif()

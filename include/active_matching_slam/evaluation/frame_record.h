@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+
+#include "active_matching_slam/evaluation/trajectory.h"
+#include "active_matching_slam/tracker/tracked_frame.h"
+
+namespace active_matching_slam {
+
+/// What a run keeps of each frame: numbers only, no images and no map, so that hours fit in memory.
+struct FrameRecord {
+  std::int64_t index = 0;
+  TrackingState state = TrackingState::kWaiting;
+  std::string reason;
+  bool repeated_image = false;
+  ScaleSource scale_source = ScaleSource::kFree;
+  StampedPose pose;    ///< a claim only when the state is kTracking
+  double speed = 0.0;  ///< [m/s]
+  Eigen::Matrix<double, 6, 6> pose_covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  double nis = 0.0;
+  int nis_degrees = 0;
+  int map_features = 0, map_points = 0;  ///< all, and those converted from inverse depth
+  int missed = 0, rejected = 0;
+  int features_started = 0, features_retired = 0, features_converted = 0;
+  int resets = 0, times_lost = 0;
+  MatchStatistics matching;
+  FrameTimings timings_ms;
+
+  bool isTracked() const { return state == TrackingState::kTracking; }
+};
+
+FrameRecord recordOf(const TrackedFrame& frame);
+
+}  // namespace active_matching_slam

@@ -1,0 +1,125 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "active_matching_slam/camera/camera_model.h"
+#include "active_matching_slam/filter/camera_state.h"
+#include "active_matching_slam/filter/covariance_matrix.h"
+#include "active_matching_slam/filter/feature_state.h"
+#include "active_matching_slam/filter/filter_options.h"
+
+namespace active_matching_slam {
+
+/// Predicted image points of some features, jointly Gaussian (Chli 2009, eq. 3.13).
+struct PredictedMeasurements {
+  std::vector<FeatureId> ids;  ///< those of the request that project (in front of the camera)
+  Eigen::VectorXd z;           ///< 2F [px]
+  Eigen::MatrixXd S;           ///< 2F x 2F, R included [px^2]
+};
+
+/// An image point assigned to a feature.
+struct FeatureMeasurement {
+  FeatureId id = -1;
+  Eigen::Vector2d pixel;
+  double sigma_px = 0.0;  ///< per axis; 0: FilterOptions::sigma_px
+};
+
+struct UpdateReport {
+  int used = 0;
+  int skipped = 0;      ///< unknown id, not finite, or behind the camera
+  double nis = 0.0;     ///< normalised innovation squared of all used, 2 * used degrees of freedom
+  bool healthy = true;  ///< false: the covariance had to be repaired or the update was refused
+};
+
+/// Extended Kalman filter over camera and map with full covariance in error-state form. The map's
+/// gauge - rotation of the world and scale - is transported with each correction (as by the
+/// invariant error of Barrau & Bonnabel 2015), so that what can not be observed is never learnt.
+class Ekf {
+ public:
+  explicit Ekf(const FilterOptions& options);
+  const FilterOptions& options() const { return options_; }
+  /// Run-time changes; throws like the constructor.
+  void setOptions(const FilterOptions& options);
+
+  /// Empties the map and puts the camera at `camera` with `covariance` (12 x 12, CameraError
+  /// order).
+  void reset(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& covariance);
+
+  /// Takes over a saved state: camera, features by ascending id (their offsets are computed anew)
+  /// and the whole covariance in that order; new features will be numbered from `next_id`. Throws
+  /// std::invalid_argument, and changes nothing, when these do not fit together.
+  void restore(const CameraState& camera, const std::vector<FeatureState>& features,
+               const Eigen::MatrixXd& covariance, FeatureId next_id);
+
+  /// The camera is somewhere else, known by other means: its old state and all that it had in common
+  /// with the map are forgotten; the map stays. `covariance` as for reset().
+  void relocateCamera(const CameraState& camera,
+                      const Eigen::Matrix<double, 12, 12>& covariance);
+
+  /// Moves on by `interval_s` >= 0 with constant velocity (eq. 3.6-3.8).
+  void predict(double interval_s);
+
+  /// New feature seen at `pixel` in the present camera; returns its id, or -1 when the pixel can't
+  /// be unprojected. Zero `inverse_depth` takes the options' prior.
+  FeatureId addInverseDepthFeature(const CameraModel& camera, const Eigen::Vector2d& pixel,
+                                   double inverse_depth = 0.0, double sigma_inverse_depth = 0.0);
+  /// New feature at a known place, independent of the rest of the state.
+  FeatureId addPointFeature(const Eigen::Vector3d& position_world,
+                            const Eigen::Matrix3d& covariance);
+  void removeFeatures(const std::vector<FeatureId>& ids);
+  /// Turns features whose depth is well known into points by the linearity index; returns which.
+  std::vector<FeatureId> convertToPoints();
+
+  PredictedMeasurements predictMeasurements(const CameraModel& camera,
+                                            const std::vector<FeatureId>& ids) const;
+  /// Corrects the state. All measurements are fused at once.
+  UpdateReport update(const CameraModel& camera,
+                      const std::vector<FeatureMeasurement>& measurements);
+
+  /// Takes the present map's scale as the unit: fuses, without moving the mean, that the mean
+  /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this only
+  /// chooses the gauge, and keeps what follows from changing the unit.
+  void fixScale(double relative_sigma);
+
+  /// Multiplies all lengths (map, position, velocity and their covariances) by `factor` > 0.
+  void rescale(double factor);
+
+  const CameraState& camera() const { return camera_; }
+  const std::vector<FeatureState>& features() const { return features_; }
+  const FeatureState* find(FeatureId id) const;  ///< null when unknown
+  FeatureId nextId() const { return next_id_; }  ///< of the next feature that is added
+  /// Symmetric, camera first, then every feature at its offset. A view: copy it to keep it.
+  CovarianceMatrix::ConstView covariance() const { return covariance_.view(); }
+  int stateSize() const { return covariance_.size(); }
+  Eigen::Matrix<double, 12, 12> cameraCovariance() const {
+    return covariance_.view().topLeftCorner<12, 12>();
+  }
+  /// 3 x 3 covariance of a feature's position in the world (first order for inverse depth).
+  Eigen::Matrix3d positionCovariance(const FeatureState& feature) const;
+  /// Standard deviation of rho, for kInverseDepth.
+  double sigmaInverseDepth(const FeatureState& feature) const;
+
+ private:
+  int indexOf(FeatureId id) const;  ///< into features_; -1 when unknown
+  FeatureState& appendFeature(FeatureKind kind);
+  void assignOffsets();
+  void limitInverseDepths();
+  /// P <- M (P - X X^T) M^T with M = I + C L^T, the transport of the gauge: C is the change of its
+  /// generators, L its functionals, PL = P L. X: the first `columns` columns of `X`, which has
+  /// kGaugeFreedoms to spare. False when variances had to be repaired.
+  bool correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
+                         const Eigen::MatrixXd& PL, int columns, Eigen::Ref<Eigen::MatrixXd> X);
+  bool repairVariances(const Eigen::VectorXd& before);
+
+  FilterOptions options_;
+  CameraState camera_;
+  std::vector<FeatureState> features_;  ///< ascending ids and offsets
+  CovarianceMatrix covariance_;
+  FeatureId next_id_ = 0;
+  std::vector<double> workspace_;  ///< of the update; kept to save allocations
+};
+
+}  // namespace active_matching_slam

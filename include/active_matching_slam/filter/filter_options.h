@@ -1,0 +1,23 @@
+#pragma once
+
+namespace active_matching_slam {
+
+/// Settings of the EKF. Units: m stands for the map unit when scale is free.
+struct FilterOptions {
+  double sigma_acceleration_mps2 = 6.0;           ///< linear, per axis (eq. 3.6)
+  double sigma_angular_acceleration_rps2 = 10.0;  ///< angular, per axis
+  double sigma_px = 0.7;                          ///< measurement noise, per axis
+  double initial_sigma_velocity_mps = 0.5;
+  double initial_sigma_angular_velocity_rps = 0.5;
+  double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
+  double initial_sigma_inverse_depth = 0.5;  ///< infinity within 2 sigma (Civera 2008)
+  double linearity_threshold = 0.02;         ///< inverse depth -> point below (Civera 2008)
+  double minimum_inverse_depth = 1e-4;       ///< mean is kept above [1/m]
+  int update_iterations =
+      1;  ///< linearisations of an update at most, 1 to 10; repeated when needed
+};
+
+/// Throws std::invalid_argument with name, value and allowed range.
+void checkFilterOptions(const FilterOptions& options);
+
+}  // namespace active_matching_slam

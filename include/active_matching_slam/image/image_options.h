@@ -1,0 +1,17 @@
+#pragma once
+
+namespace active_matching_slam {
+
+/// Settings of patches, correlation and corner detection. Lengths in pixels.
+struct ImageOptions {
+  int template_size_px = 11;      ///< odd, 5 to 31: side of the correlated template
+  int source_patch_size_px = 31;  ///< odd: stored at first sight, large enough to be warped
+  double match_threshold = 0.8;   ///< least ZNCC of a match, (0, 1)
+  double corner_quality = 0.2;    ///< Shi-Tomasi: least share of the strongest response
+  double minimum_contrast = 4.0;  ///< least standard deviation of a template [grey levels]
+  int border_px = 8;              ///< features are not searched closer to the image border
+};
+
+void checkImageOptions(const ImageOptions& options);
+
+}  // namespace active_matching_slam

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "active_matching_slam/image/template.h"
+
+namespace active_matching_slam {
+
+/// Offset (u, v) of the peak of a paraboloid fitted by least squares to 3 x 3 scores (row by row,
+/// the middle one a local maximum), within [-0.5, 0.5] on each axis. Zero when the fit has no peak.
+Eigen::Vector2d paraboloidPeak(const float scores[9]);
+
+/// Aligns the template with the image by translation, gain and offset (inverse compositional
+/// Gauss-Newton), from `start` [px], which should be within a pixel of the truth. Empty when it
+/// does not converge, moves more than a pixel from `start`, or leaves the image.
+std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Template& patch,
+                                              const Eigen::Vector2d& start);
+
+}  // namespace active_matching_slam

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "active_matching_slam/information/mutual_information_accumulator.h"
+#include "active_matching_slam/information/mutual_information_graph.h"
+#include "active_matching_slam/information/submap_hierarchy.h"
+#include "active_matching_slam/information/submap_tracker.h"
+
+namespace active_matching_slam {
+
+/// The structure of the map while it grows: the MI graph, its tree, and the hierarchy of submaps
+/// with labels that persist. Frames in, snapshots out.
+class MapStructure {
+ public:
+  /// As MutualInformationAccumulator's.
+  void addFrame(const std::vector<std::int64_t>& ids, const Eigen::Ref<const Eigen::MatrixXd>& S);
+  void keepOnly(const std::vector<std::int64_t>& ids);
+  void clear();
+
+  struct Snapshot {
+    std::shared_ptr<const MutualInformationGraph> graph;
+    std::shared_ptr<const SubmapHierarchy> submaps;
+  };
+  /// The structure as it is now; never null. Labels follow from those of the snapshot before.
+  Snapshot snapshot();
+
+  /// Goes on from a stored graph. Throws std::invalid_argument and changes nothing.
+  void restore(const MutualInformationGraph& graph);
+
+ private:
+  MutualInformationAccumulator accumulator_;
+  SubmapTracker tracker_;
+};
+
+}  // namespace active_matching_slam

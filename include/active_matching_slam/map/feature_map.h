@@ -1,0 +1,90 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "active_matching_slam/camera/camera_model.h"
+#include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/image/patch.h"
+#include "active_matching_slam/image/template.h"
+#include "active_matching_slam/image/warp.h"
+#include "active_matching_slam/map/map_options.h"
+#include "active_matching_slam/matching/feature_rate_statistics.h"
+
+namespace active_matching_slam {
+
+/// What the map knows of a feature beside its state in the filter.
+struct MapFeature {
+  FeatureId id = -1;
+  SourcePatch patch;
+  bool known = false;           ///< from a known target: never retired
+  int attempts = 0;             ///< frames in which it was searched
+  int successes = 0;            ///< of these, frames in which its match was accepted
+  double recent_rate = 1.0;     ///< successes a search, averaged over about the last ten
+  FeatureRateStatistics rates;  ///< learnt for the matchers
+  std::int64_t first_frame = 0;
+  std::int64_t last_matched_frame = 0;
+};
+
+/// A feature that should be seen in the present image.
+struct VisibleFeature {
+  FeatureId id = -1;
+  PatchView view;
+};
+
+/// How a searched feature fared.
+struct SearchRecord {
+  FeatureId id = -1;
+  bool matched = false;      ///< its match was accepted
+  std::int64_t matches = 0;  ///< met in all, the accepted one included
+  std::int64_t pixels = 0;   ///< searched
+};
+
+/// Which features exist and which are looked for. Means and covariances are the filter's; the two
+/// hold the same ids at all times.
+class FeatureMap {
+ public:
+  const std::vector<MapFeature>& features() const { return features_; }
+  const MapFeature* find(FeatureId id) const;  ///< null when unknown
+  int size() const { return static_cast<int>(features_.size()); }
+  std::int64_t retiredTotal() const { return retired_total_; }
+
+  void clear();
+  void add(MapFeature feature);
+  /// Forgets features that the filter has been told to remove.
+  void retire(const std::vector<FeatureId>& ids);
+  /// Multiplies all lengths by `factor` > 0, as the filter has been told to.
+  void rescale(double factor);
+
+  /// Features predicted in front of the camera, inside the image less `border_px`, and neither too
+  /// oblique nor too different in size from first sight. Ascending id.
+  std::vector<VisibleFeature> visible(const Ekf& filter, const CameraModel& camera,
+                                      const MapOptions& options, double border_px) const;
+
+  /// At most `wanted` of them, spread over the image: cells of a grid in turn, in each the features
+  /// with the best record first. Ascending id. Known features always come along.
+  std::vector<VisibleFeature> choose(const std::vector<VisibleFeature>& visible,
+                                     const CameraModel& camera, int wanted) const;
+
+  /// Counts a frame's searches. A frame in which fewer than a third were matched speaks of the
+  /// image (blur, occlusion), not of the features, and counts for the matched ones only.
+  void record(const std::vector<SearchRecord>& searches, std::int64_t frame);
+
+  /// How many of these features will probably be matched, by their recent record.
+  double expectedMatches(const std::vector<VisibleFeature>& visible) const;
+
+  /// Features that fail too often.
+  std::vector<FeatureId> failing(const MapOptions& options) const;
+
+  /// The `count` features that inform least about the camera's present and near surroundings: those
+  /// whose first view is furthest from the present one, in direction and, in units of their depth,
+  /// in place, with what has not been matched lately counted as further. Never a known one.
+  std::vector<FeatureId> leastInformative(const Ekf& filter, int count) const;
+
+ private:
+  std::vector<MapFeature> features_;  ///< ascending id
+  std::int64_t retired_total_ = 0;
+};
+
+}  // namespace active_matching_slam

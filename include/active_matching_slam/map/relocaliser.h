@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "active_matching_slam/camera/camera_model.h"
+#include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/image/image_options.h"
+#include "active_matching_slam/map/feature_map.h"
+
+namespace active_matching_slam {
+
+struct RelocaliserOptions {
+  int minimum_inliers = 10;  ///< features that must be found where they should be
+  double minimum_visible_share =
+      0.5;                            ///< of the features that should be seen and could be searched
+  double maximum_depth_sigma = 0.25;  ///< relative: features of vaguer depth are not used
+  double search_radius_px = 8.0;      ///< around the features as the first pose predicts them
+  double inlier_px = 3.0;             ///< a found feature's largest distance from prediction
+};
+
+/// Throws std::invalid_argument with name, value and range.
+void checkRelocaliserOptions(const RelocaliserOptions& options);
+
+struct Relocalisation {
+  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
+  std::vector<FeatureMeasurement> inliers;  ///< ascending id, sub-pixel
+  int searched = 0;                         ///< features that should be seen; the inliers' base
+  double rms_px = 0.0;                      ///< of the inliers, both axes together
+};
+
+/// Finds the camera in the map from one image, without any guess where it is: descriptors (ORB,
+/// Rublee et al. 2011) of the features at first sight against corners of the image at several
+/// scales, a pose by RANSAC, and then the proof: most features that the pose says are visible must
+/// match there by their warped templates. Deterministic. The map is used as if it were certain.
+class Relocaliser {
+ public:
+  /// Throws as the check functions.
+  Relocaliser(const CameraModel& camera, const RelocaliserOptions& options, const MapOptions& map,
+              const ImageOptions& image);
+
+  /// `image`: 8-bit grey of the camera's size. Empty when the place can't be told with certainty.
+  /// The camera of `filter` plays no part.
+  std::optional<Relocalisation> find(const cv::Mat& image, const Ekf& filter,
+                                     const FeatureMap& map) const;
+
+ private:
+  struct Landmark {
+    const MapFeature* feature;
+    const FeatureState* state;
+  };
+  struct Sighting {
+    const Landmark* landmark;
+    Eigen::Vector2d pixel;
+  };
+  std::vector<Landmark> usableLandmarks(const Ekf& filter, const FeatureMap& map) const;
+  std::vector<Sighting> matchDescriptors(const cv::Mat& image,
+                                         const std::vector<Landmark>& landmarks) const;
+  std::optional<Eigen::Isometry3d> solvePose(const std::vector<Sighting>& sightings) const;
+  /// Searches all that should be seen within `radius_px`; returns how many that are.
+  int searchVisible(const cv::Mat& image, const std::vector<Landmark>& landmarks,
+                    const Eigen::Isometry3d& T_world_camera, double radius_px,
+                    std::vector<Sighting>* found) const;
+  Eigen::Isometry3d refinePose(const std::vector<Sighting>& sightings,
+                               Eigen::Isometry3d T_world_camera) const;
+  /// Distance of a sighting from where the pose predicts it; infinite when it predicts none.
+  double residual(const Sighting& sighting, const Eigen::Isometry3d& T_world_camera) const;
+
+  CameraModel camera_;
+  RelocaliserOptions options_;
+  MapOptions map_options_;
+  ImageOptions image_options_;
+};
+
+}  // namespace active_matching_slam

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "active_matching_slam/matching/measurement_prior.h"
+
+namespace active_matching_slam {
+
+/// How a mixture is re-weighted after a search.
+enum class UpdateRule {
+  kIncremental,  ///< every pixel counted once; weights are probabilities
+  kThesis        ///< Chli 2009, eq. 5.10
+};
+
+/// Settings of the matchers. Each states which matchers read it.
+struct MatchOptions {
+  FeatureRates default_rates;     ///< mixture matchers: for features without rates of their own
+  bool use_feature_rates = true;  ///< false: the default rates for all
+
+  // Mixture of Gaussians: active, fast_active, chow_liu.
+  UpdateRule update_rule = UpdateRule::kIncremental;
+  double prune_weight = 0.001;  ///< Gaussians below are dropped, [0, 1)
+  int max_gaussians = 0;        ///< cap on the live mixture; the lightest go first; 0: no cap
+  double latch_information_bits = 0.0;  ///< stop rule (a): below, no more MI is computed; 0: never
+  /// Stop rule: done when the heaviest Gaussian weighs at least this and has no feature left to
+  /// search; 0: never, the search goes on until no Gaussian has a candidate.
+  double finish_weight = 0.0;
+  double ambiguous_below_weight = 0.0;  ///< a result of less weight is marked ambiguous; 0: never
+  int fast_candidates = 15;             ///< fast_active: candidates evaluated a step
+  double fast_latch_bits = 0.5;         ///< fast_active: largest MI under which it latches
+  double fast_accept_weight = 0.7;  ///< fast_active: weight at which a Gaussian is taken after that
+  std::uint64_t seed = 1;           ///< fast_active, one_point_ransac
+
+  // Budget of a frame: active, fast_active, chow_liu, jcbb (time).
+  std::int64_t max_pixels = 0;    ///< distinct pixels searched; 0: no limit
+  double max_milliseconds = 0.0;  ///< 0: no limit
+  /// auto: active is taken while its modelled cost is below max_milliseconds or, without that
+  /// limit, below this. The model counts features and expected matches; no clock decides.
+  double auto_milliseconds = 10.0;
+  /// Monotonic clock of the budget and of the reported durations, in seconds; empty: steady_clock.
+  std::function<double()> clock_s;
+
+  // jcbb
+  std::int64_t jcbb_max_nodes = 100000;  ///< 0: no limit
+  double jcbb_confidence = 0.95;         ///< chi-square level of joint compatibility
+
+  // one_point_ransac
+  double ransac_inlier_chi2 = 5.9915;  ///< low innovation: |residual|^2 < chi2 * R
+  double ransac_rescue_chi2 = 9.2103;  ///< high innovation: gate of the conditional
+  int ransac_max_hypotheses = 0;       ///< 0: every feature in turn (exhaustive, deterministic)
+
+  bool keep_trace = false;  ///< record every step in MatchResult::trace
+};
+
+/// Throws std::invalid_argument with name, value and allowed range.
+void checkMatchOptions(const MatchOptions& options);
+
+}  // namespace active_matching_slam

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace active_matching_slam {
+
+/// Identifies a map feature for as long as the map lives; never reused.
+using FeatureId = std::int64_t;
+
+/// How often a feature's search tells the truth (Chli 2009, section 5.3.3).
+struct FeatureRates {
+  double true_positive = 0.9;    ///< Ptp: probability of a match where the feature is, in (0, 1)
+  double false_positive = 1e-4;  ///< Pfp: probability of a spurious match per pixel, in (0, 1)
+};
+
+/// All that a matcher knows of the filter: the joint Gaussian prediction of the image points of the
+/// F features that should be visible. (Chli 2009, eq. 3.13)
+struct MeasurementPrior {
+  std::vector<FeatureId> ids;       ///< F
+  Eigen::VectorXd z;                ///< 2F: u0 v0 u1 v1 ... [px]
+  Eigen::MatrixXd S;                ///< 2F x 2F, measurement noise included [px^2]
+  double noise_variance_px2 = 1.0;  ///< R = noise_variance_px2 * I, already inside S
+  std::vector<FeatureRates> rates;  ///< F, or empty for the defaults of the options
+
+  int size() const { return static_cast<int>(ids.size()); }
+  auto mean(int feature) const { return z.segment<2>(2 * feature); }
+  auto covariance(int feature) const { return S.block<2, 2>(2 * feature, 2 * feature); }
+};
+
+}  // namespace active_matching_slam

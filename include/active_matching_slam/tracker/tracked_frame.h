@@ -1,0 +1,95 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/information/mutual_information_graph.h"
+#include "active_matching_slam/information/submap_hierarchy.h"
+#include "active_matching_slam/matching/match_result.h"
+
+namespace active_matching_slam {
+
+enum class TrackingState {
+  kWaiting,       ///< no image accepted yet
+  kInitialising,  ///< looking for the known target, or for the first features
+  kTracking,
+  kLost  ///< no pose is claimed; searching for the map in the whole image
+};
+std::string trackingStateName(TrackingState state);
+
+enum class ScaleSource { kFree, kKnownTarget, kKnownPoints, kService };
+std::string scaleSourceName(ScaleSource source);
+
+/// What became of a feature in this frame.
+enum class FeatureStatus {
+  kNotVisible,   ///< outside the image, behind, or seen too differently from its first sight
+  kNotSearched,  ///< predicted visible but not chosen, or the budget ended first
+  kMissed,       ///< searched, no match met
+  kRejected,     ///< a match was met but not accepted
+  kMatched
+};
+std::string featureStatusName(FeatureStatus status);
+
+/// A feature as anyone may publish, draw, log or test it.
+struct TrackedFeature {
+  FeatureId id = -1;
+  FeatureKind kind = FeatureKind::kInverseDepth;
+  Eigen::Vector3d position_world;
+  Eigen::Matrix3d covariance_world;  ///< first order
+  Eigen::Vector3d anchor_world;      ///< kInverseDepth: the ray and its depth
+  Eigen::Vector3d bearing_world;
+  double inverse_depth = 0.0;
+  double sigma_inverse_depth = 0.0;
+  FeatureStatus status = FeatureStatus::kNotVisible;
+  bool known = false;                         ///< from the known target or known points
+  Eigen::Vector2d predicted_px;               ///< valid unless kNotVisible
+  Eigen::Matrix2d innovation_covariance_px2;  ///< prior S_ii; valid unless kNotVisible
+  Eigen::Vector2d matched_px;                 ///< kMatched (and kRejected: the best match met)
+  double score = 0.0;                         ///< ZNCC of the match
+  double information_bits = 0.0;              ///< I(z_i; rest) in the prior
+  int attempts = 0;                           ///< frames searched since it was started
+  int successes = 0;                          ///< frames matched
+  cv::Mat template_image;                     ///< 8-bit source patch at first sight
+};
+
+/// Time spent in each stage of a frame [ms].
+struct FrameTimings {
+  double predict = 0, measure = 0, match = 0, update = 0, map = 0, structure = 0, total = 0;
+};
+
+/// Everything there is to know about one processed image. Immutable once returned.
+struct TrackedFrame {
+  double stamp_s = 0.0;
+  std::int64_t index = 0;  ///< counts images given to the tracker since construction
+  TrackingState state = TrackingState::kWaiting;
+  std::string reason;           ///< why the state is what it is; empty while all is well
+  bool repeated_image = false;  ///< identical to the one before: no new information was fused
+  ScaleSource scale_source = ScaleSource::kFree;
+
+  CameraState camera;
+  /// 12 x 12, CameraError order (world-frame additive position, world-frame rotation vector, ...).
+  Eigen::Matrix<double, 12, 12> camera_covariance = Eigen::Matrix<double, 12, 12>::Zero();
+  double nis = 0.0;
+  int nis_degrees = 0;
+
+  std::vector<TrackedFeature> features;
+  std::vector<std::vector<SearchMatch>> matches;  ///< all matches met, per candidate
+  std::vector<int> candidates;  ///< index into `features` of each entry of the MeasurementPrior
+  MatchResult matching;
+  int features_started = 0, features_retired = 0, features_converted = 0;
+  std::int64_t retired_total = 0;
+  int resets = 0;  ///< resets since construction
+  int times_lost = 0;
+
+  std::shared_ptr<const MutualInformationGraph> graph;  ///< null unless asked for
+  std::shared_ptr<const SubmapHierarchy> submaps;       ///< null unless asked for
+
+  cv::Mat image;  ///< 8-bit grey, as tracked (shared, not to be written to)
+  FrameTimings timings_ms;
+};
+
+}  // namespace active_matching_slam

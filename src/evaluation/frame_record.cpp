@@ -1,0 +1,33 @@
+#include "active_matching_slam/evaluation/frame_record.h"
+
+namespace active_matching_slam {
+
+FrameRecord recordOf(const TrackedFrame& frame) {
+  FrameRecord record;
+  record.index = frame.index;
+  record.state = frame.state;
+  record.reason = frame.reason;
+  record.repeated_image = frame.repeated_image;
+  record.scale_source = frame.scale_source;
+  record.pose = {frame.stamp_s, frame.camera.poseWorldCamera()};
+  record.speed = frame.camera.velocity_world.norm();
+  record.pose_covariance = frame.camera_covariance.topLeftCorner<6, 6>();
+  record.nis = frame.nis;
+  record.nis_degrees = frame.nis_degrees;
+  record.map_features = static_cast<int>(frame.features.size());
+  for (const TrackedFeature& feature : frame.features) {
+    if (feature.kind == FeatureKind::kPoint) ++record.map_points;
+    if (feature.status == FeatureStatus::kMissed) ++record.missed;
+    if (feature.status == FeatureStatus::kRejected) ++record.rejected;
+  }
+  record.features_started = frame.features_started;
+  record.features_retired = frame.features_retired;
+  record.features_converted = frame.features_converted;
+  record.resets = frame.resets;
+  record.times_lost = frame.times_lost;
+  record.matching = frame.matching.statistics;
+  record.timings_ms = frame.timings_ms;
+  return record;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,193 @@
+#include "active_matching_slam/evaluation/run_summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "active_matching_slam/evaluation/consistency.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+bool isMetric(const std::vector<FrameRecord>& records) {
+  return !records.empty() && records.back().scale_source != ScaleSource::kFree;
+}
+
+/// Pairs of (record, true pose in truth.trajectory) of the tracked frames, by ascending stamp.
+std::vector<std::pair<int, int>> associateTracked(const std::vector<FrameRecord>& records,
+                                                  const RunTruth& truth) {
+  std::vector<int> record_of_pose;
+  Trajectory tracked;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (!records[i].isTracked()) continue;
+    record_of_pose.push_back(static_cast<int>(i));
+    tracked.push_back(records[i].pose);
+  }
+  std::vector<std::pair<int, int>> pairs =
+      associateByStamp(tracked, truth.trajectory, truth.association_s);
+  for (auto& pair : pairs) pair.first = record_of_pose[pair.first];
+  return pairs;
+}
+
+std::vector<PosePair> posesOf(const std::vector<std::pair<int, int>>& indices,
+                              const std::vector<FrameRecord>& records, const RunTruth& truth) {
+  std::vector<PosePair> pairs;
+  for (const auto& [r, t] : indices)
+    pairs.push_back({records[r].pose.stamp_s, records[r].pose.T_world_camera,
+                     truth.trajectory[t].T_world_camera});
+  return pairs;
+}
+
+/// Brings the truth into the world of the map, in which the filter's covariance is stated. A metric
+/// map shares the truth's world. A free one has its origin in its first camera, known without
+/// error, and its unit of length is a convention: the one that fits the run best.
+std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, bool metric) {
+  if (metric || pairs.empty()) return pairs;
+  const std::optional<Alignment> similarity = align(pairs, AlignmentKind::kSimilarity);
+  const double unit = similarity ? similarity->scale : 1.0;
+  const Eigen::Isometry3d T_map_camera0 = pairs.front().T_world_camera_estimate;
+  const Eigen::Isometry3d T_truth_camera0 = pairs.front().T_world_camera_truth;
+  for (PosePair& pair : pairs) {
+    Eigen::Isometry3d T_camera0_camera = T_truth_camera0.inverse() * pair.T_world_camera_truth;
+    T_camera0_camera.translation() /= unit;
+    pair.T_world_camera_truth = T_map_camera0 * T_camera0_camera;
+  }
+  return pairs;
+}
+
+void summariseErrors(const std::vector<FrameRecord>& records, const RunTruth& truth,
+                     RunSummary* summary) {
+  const std::vector<PosePair> pairs = posesOf(associateTracked(records, truth), records, truth);
+  summary->truth_pairs = static_cast<int>(pairs.size());
+  if (const auto rigid = align(pairs, AlignmentKind::kRigid))
+    summary->ate_se3_m = absoluteTrajectoryError(pairs, *rigid);
+  if (const auto similarity = align(pairs, AlignmentKind::kSimilarity)) {
+    summary->ate_sim3_m = absoluteTrajectoryError(pairs, *similarity);
+    summary->sim3_scale = similarity->scale;
+  }
+  if (isMetric(records) || summary->sim3_scale)
+    summary->rpe = relativePoseError(pairs, 1.0, isMetric(records) ? 1.0 : *summary->sim3_scale);
+  if (!truth.simulated) return;
+  std::vector<double> nees;
+  for (double value : frameErrors(records, truth).pose_nees)
+    if (std::isfinite(value)) nees.push_back(value);
+  if (nees.empty()) return;
+  double sum = 0.0;
+  for (double value : nees) sum += value;
+  summary->nees_mean = sum / static_cast<double>(nees.size());
+  summary->nees_share_within = shareWithin(nees, chiSquareMeanBounds(6, 1));
+}
+
+void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summary) {
+  double matched = 0.0, candidates = 0.0;
+  for (const FrameRecord& record : records) {
+    const MatchStatistics& matching = record.matching;
+    if (record.isTracked()) {
+      ++summary->frames_tracked;
+      matched += matching.matched;
+      candidates += matching.candidates;
+    }
+    if (!matching.matcher.empty()) summary->matcher = matching.matcher;
+    summary->pixels_searched += matching.pixels_searched;
+    summary->pixels_full_gates += matching.pixels_full_gates;
+    summary->max_gaussians = std::max(summary->max_gaussians, matching.max_gaussians);
+    if (matching.cut_short) ++summary->cut_short_frames;
+    if (matching.ambiguous) ++summary->ambiguous_frames;
+    summary->map_features_most = std::max(summary->map_features_most, record.map_features);
+    summary->started += record.features_started;
+    summary->retired += record.features_retired;
+    summary->converted += record.features_converted;
+    summary->times_lost = std::max(summary->times_lost, record.times_lost);
+    summary->resets = std::max(summary->resets, record.resets);
+  }
+  if (summary->frames_tracked > 0) {
+    summary->matched_mean = matched / summary->frames_tracked;
+    summary->candidates_mean = candidates / summary->frames_tracked;
+  }
+}
+
+}  // namespace
+
+Trajectory trackedTrajectory(const std::vector<FrameRecord>& records) {
+  Trajectory trajectory;
+  for (const FrameRecord& record : records)
+    if (record.isTracked()) trajectory.push_back(record.pose);
+  return trajectory;
+}
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const double rank = std::ceil(share * static_cast<double>(values.size()));
+  const std::size_t index =
+      std::min(values.size() - 1, static_cast<std::size_t>(std::max(0.0, rank - 1.0)));
+  std::nth_element(values.begin(), values.begin() + index, values.end());
+  return values[index];
+}
+
+std::vector<std::pair<std::string, double>> namedDurations(const FrameRecord& record) {
+  const FrameTimings& t = record.timings_ms;
+  const MatchStatistics& m = record.matching;
+  return {{"predict", t.predict},
+          {"measure", t.measure},
+          {"match", t.match},
+          {"update", t.update},
+          {"map", t.map},
+          {"structure", t.structure},
+          {"match_information", m.information_ms},
+          {"match_correlation", m.correlation_ms},
+          {"match_mixture", m.mixture_ms},
+          {"match_tree", m.tree_ms},
+          {"total", t.total}};
+}
+
+FrameErrors frameErrors(const std::vector<FrameRecord>& records, const RunTruth& truth) {
+  FrameErrors errors;
+  errors.position_m.assign(records.size(), kNaN);
+  errors.pose_nees.assign(records.size(), kNaN);
+  const std::vector<std::pair<int, int>> indices = associateTracked(records, truth);
+  const std::vector<PosePair> pairs = posesOf(indices, records, truth);
+  const bool metric = isMetric(records);
+  const auto alignment = align(pairs, metric ? AlignmentKind::kRigid : AlignmentKind::kSimilarity);
+  if (alignment) {
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      errors.position_m[indices[i].first] = absoluteTrajectoryError({pairs[i]}, *alignment);
+  }
+  if (!truth.simulated) return errors;
+  const std::vector<PosePair> in_map = inMapWorld(pairs, metric);
+  for (std::size_t i = 0; i < in_map.size(); ++i) {
+    const FrameRecord& record = records[indices[i].first];
+    const auto nees = normalisedErrorSquared(
+        poseError(in_map[i].T_world_camera_estimate, in_map[i].T_world_camera_truth),
+        record.pose_covariance);
+    if (nees) errors.pose_nees[indices[i].first] = *nees;
+  }
+  return errors;
+}
+
+RunSummary summarise(const std::vector<FrameRecord>& records, const RunTruth& truth) {
+  RunSummary summary;
+  summary.frames = static_cast<int>(records.size());
+  if (records.empty()) return summary;
+  summary.scale_source = records.back().scale_source;
+  summary.duration_s = records.back().pose.stamp_s - records.front().pose.stamp_s;
+  summary.map_features_end = records.back().map_features;
+  summariseMatching(records, &summary);
+  summariseErrors(records, truth, &summary);
+  summary.excursion = measureExcursion(trackedTrajectory(records));
+
+  const std::size_t stages = namedDurations(records.front()).size();
+  std::vector<std::vector<double>> values(stages);
+  for (const FrameRecord& record : records) {
+    const auto durations = namedDurations(record);
+    for (std::size_t stage = 0; stage < stages; ++stage)
+      values[stage].push_back(durations[stage].second);
+  }
+  for (std::size_t stage = 0; stage < stages; ++stage)
+    summary.durations.push_back({namedDurations(records.front())[stage].first,
+                                 percentile(values[stage], 0.5), percentile(values[stage], 0.99)});
+  return summary;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,107 @@
+#include "active_matching_slam/filter/ekf.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "active_matching_slam/filter/blas_threads.h"
+#include "active_matching_slam/filter/rotation.h"
+#include "active_matching_slam/filter/state_error.h"
+
+namespace active_matching_slam {
+
+Ekf::Ekf(const FilterOptions& options) : options_(options) {
+  checkFilterOptions(options);
+  useSingleThreadedBlas();
+  covariance_.reset(CameraError::kSize);
+}
+
+void Ekf::setOptions(const FilterOptions& options) {
+  checkFilterOptions(options);
+  options_ = options;
+}
+
+void Ekf::reset(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& covariance) {
+  camera_ = camera;
+  camera_.q_world_camera.normalize();
+  features_.clear();
+  covariance_.reset(CameraError::kSize);
+  covariance_.view() = 0.5 * (covariance + covariance.transpose());
+}
+
+void Ekf::predict(double interval_s) {
+  if (!(interval_s > 0.0) || !std::isfinite(interval_s)) return;
+  const Eigen::Vector3d turn = camera_.angular_velocity_camera * interval_s;
+  // exp([R (w + dw) dt]x) R = R exp([(w + dw) dt]x): the rotation error gains K dw in the world.
+  const Eigen::Matrix3d K =
+      camera_.q_world_camera.toRotationMatrix() * leftJacobian(turn) * interval_s;
+  camera_.position_world += camera_.velocity_world * interval_s;
+  camera_.q_world_camera = (camera_.q_world_camera * rotationFromVector(turn)).normalized();
+
+  // P <- F P F^T touches the camera's rows and columns only.
+  auto P = covariance_.view();
+  const int map_size = covariance_.size() - CameraError::kSize;
+  Eigen::Matrix<double, 12, 12> F = Eigen::Matrix<double, 12, 12>::Identity();
+  F.block<3, 3>(CameraError::kPosition, CameraError::kVelocity) =
+      interval_s * Eigen::Matrix3d::Identity();
+  F.block<3, 3>(CameraError::kRotation, CameraError::kAngularVelocity) = K;
+  auto P_camera = P.topLeftCorner<12, 12>();
+  Eigen::Matrix<double, 12, 12> predicted = F * P_camera * F.transpose();
+
+  // Impulses V = a dt, Omega = alpha dt enter like the velocities themselves (eq. 3.7).
+  Eigen::Matrix<double, 12, 6> G = F.rightCols<6>();
+  Eigen::Matrix<double, 6, 1> variance;
+  variance.head<3>().setConstant(std::pow(options_.sigma_acceleration_mps2 * interval_s, 2));
+  variance.tail<3>().setConstant(
+      std::pow(options_.sigma_angular_acceleration_rps2 * interval_s, 2));
+  predicted += G * variance.asDiagonal() * G.transpose();
+  P_camera = 0.5 * (predicted + predicted.transpose());
+
+  auto camera_map = P.topRightCorner(CameraError::kSize, map_size);
+  for (int j = 0; j < map_size; ++j) {
+    camera_map.col(j).segment<3>(CameraError::kPosition) +=
+        interval_s * camera_map.col(j).segment<3>(CameraError::kVelocity);
+    camera_map.col(j).segment<3>(CameraError::kRotation) +=
+        K * camera_map.col(j).segment<3>(CameraError::kAngularVelocity);
+  }
+  P.bottomLeftCorner(map_size, CameraError::kSize) = camera_map.transpose();
+}
+
+void Ekf::rescale(double factor) {
+  if (!(factor > 0.0) || !std::isfinite(factor)) {
+    throw std::invalid_argument("scale factor = " + std::to_string(factor) +
+                                " is outside (0, inf)");
+  }
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(covariance_.size());
+  scale.segment<3>(CameraError::kPosition).setConstant(factor);
+  scale.segment<3>(CameraError::kVelocity).setConstant(factor);
+  camera_.position_world *= factor;
+  camera_.velocity_world *= factor;
+  for (FeatureState& feature : features_) {
+    scale.segment<3>(feature.offset).setConstant(factor);
+    feature.anchor_world *= factor;
+    feature.point_world *= factor;
+    if (feature.kind == FeatureKind::kInverseDepth) {
+      scale[feature.offset + FeatureError::kInverseDepth] = 1.0 / factor;
+      feature.inverse_depth /= factor;
+    }
+  }
+  auto P = covariance_.view();
+  for (int j = 0; j < P.cols(); ++j) {
+    for (int i = 0; i < P.rows(); ++i) P(i, j) *= scale[i] * scale[j];
+  }
+}
+
+int Ekf::indexOf(FeatureId id) const {
+  const auto it = std::lower_bound(features_.begin(), features_.end(), id,
+                                   [](const FeatureState& f, FeatureId i) { return f.id < i; });
+  return it != features_.end() && it->id == id ? static_cast<int>(it - features_.begin()) : -1;
+}
+
+const FeatureState* Ekf::find(FeatureId id) const {
+  const int index = indexOf(id);
+  return index < 0 ? nullptr : &features_[index];
+}
+
+}  // namespace active_matching_slam

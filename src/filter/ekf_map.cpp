@@ -1,0 +1,158 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/filter/rotation.h"
+#include "active_matching_slam/filter/state_error.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// d position / d (anchor, bearing, inverse depth) of p = a + m / rho.
+Eigen::Matrix<double, 3, 6> positionJacobian(const FeatureState& feature) {
+  const double depth = 1.0 / feature.inverse_depth;
+  Eigen::Matrix<double, 3, 6> J;
+  J << Eigen::Matrix3d::Identity(), depth * feature.tangentBasis(),
+      -depth * depth * feature.bearing_world;
+  return J;
+}
+
+/// Linearity index of the depth error as the camera sees it now (Civera 2008, eq. 22).
+double linearityIndex(const FeatureState& feature, double sigma_inverse_depth,
+                      const Eigen::Vector3d& camera_position) {
+  const Eigen::Vector3d from_camera = feature.position() - camera_position;
+  const double distance = from_camera.norm();
+  const double sigma_depth = sigma_inverse_depth / (feature.inverse_depth * feature.inverse_depth);
+  const double cos_parallax = feature.bearing_world.dot(from_camera) / distance;
+  return 4.0 * sigma_depth * std::abs(cos_parallax) / distance;
+}
+
+}  // namespace
+
+FeatureState& Ekf::appendFeature(FeatureKind kind) {
+  FeatureState feature;
+  feature.id = next_id_++;
+  feature.kind = kind;
+  feature.offset = covariance_.size();
+  features_.push_back(feature);
+  covariance_.extend(feature.size());
+  return features_.back();
+}
+
+void Ekf::assignOffsets() {
+  int offset = CameraError::kSize;
+  for (FeatureState& feature : features_) {
+    feature.offset = offset;
+    offset += feature.size();
+  }
+}
+
+FeatureId Ekf::addInverseDepthFeature(const CameraModel& camera, const Eigen::Vector2d& pixel,
+                                      double inverse_depth, double sigma_inverse_depth) {
+  if (!pixel.allFinite()) return -1;
+  Eigen::Matrix<double, 3, 2> d_bearing_d_pixel;
+  const auto bearing = camera.unproject(pixel, &d_bearing_d_pixel);
+  if (!bearing || !bearing->allFinite() || !d_bearing_d_pixel.allFinite()) return -1;
+
+  FeatureState& feature = appendFeature(FeatureKind::kInverseDepth);
+  const Eigen::Matrix3d R = camera_.q_world_camera.toRotationMatrix();
+  feature.anchor_world = camera_.position_world;
+  feature.bearing_world = (R * *bearing).normalized();
+  const Eigen::Vector3d axis = R.col(std::abs(bearing->x()) < 0.9 ? 0 : 1);
+  feature.tangent_world =
+      (axis - feature.bearing_world * feature.bearing_world.dot(axis)).normalized();
+  feature.inverse_depth = inverse_depth > 0.0 ? inverse_depth : options_.initial_inverse_depth;
+  const double sigma_rho =
+      sigma_inverse_depth > 0.0 ? sigma_inverse_depth : options_.initial_sigma_inverse_depth;
+
+  // The anchor is the camera's place, the bearing turns with the camera; only the pixel's noise and
+  // the depth are new.
+  auto P = covariance_.view();
+  const int o = feature.offset;
+  const Eigen::Matrix<double, 2, 3> N = bearingGauge(feature);
+  P.middleRows<3>(o).leftCols(o) = P.middleRows<3>(CameraError::kPosition).leftCols(o);
+  P.middleRows<2>(o + FeatureError::kBearing).leftCols(o) =
+      N * P.middleRows<3>(CameraError::kRotation).leftCols(o);
+  P.topRightCorner(o, 6) = P.bottomLeftCorner(6, o).transpose();
+  P.block<6, 3>(o, o) = P.block<6, 3>(o, CameraError::kPosition);
+  P.block<6, 2>(o, o + FeatureError::kBearing) =
+      P.block<6, 3>(o, CameraError::kRotation) * N.transpose();
+  const Eigen::Matrix2d d_error_d_pixel =
+      feature.tangentBasis().transpose() * R * d_bearing_d_pixel;
+  P.block<2, 2>(o + FeatureError::kBearing, o + FeatureError::kBearing) +=
+      options_.sigma_px * options_.sigma_px * d_error_d_pixel * d_error_d_pixel.transpose();
+  P(o + FeatureError::kInverseDepth, o + FeatureError::kInverseDepth) += sigma_rho * sigma_rho;
+  const Eigen::Matrix<double, 6, 6> own = P.block<6, 6>(o, o);
+  P.block<6, 6>(o, o) = 0.5 * (own + own.transpose());
+  return feature.id;
+}
+
+FeatureId Ekf::addPointFeature(const Eigen::Vector3d& position_world,
+                               const Eigen::Matrix3d& covariance) {
+  FeatureState& feature = appendFeature(FeatureKind::kPoint);
+  feature.point_world = position_world;
+  covariance_.view().bottomRightCorner<3, 3>() = 0.5 * (covariance + covariance.transpose());
+  return feature.id;
+}
+
+void Ekf::removeFeatures(const std::vector<FeatureId>& ids) {
+  std::vector<FeatureId> gone(ids);
+  std::sort(gone.begin(), gone.end());
+  std::vector<FeatureState> kept;
+  std::vector<std::pair<int, int>> ranges{{0, CameraError::kSize}};
+  for (const FeatureState& feature : features_) {
+    if (std::binary_search(gone.begin(), gone.end(), feature.id)) continue;
+    kept.push_back(feature);
+    ranges.emplace_back(feature.offset, feature.size());
+  }
+  if (kept.size() == features_.size()) return;
+  features_.swap(kept);
+  covariance_.keep(ranges);
+  assignOffsets();
+}
+
+std::vector<FeatureId> Ekf::convertToPoints() {
+  std::vector<FeatureId> converted;
+  std::vector<std::pair<int, int>> ranges{{0, CameraError::kSize}};
+  auto P = covariance_.view();
+  for (FeatureState& feature : features_) {
+    if (feature.kind == FeatureKind::kInverseDepth &&
+        feature.inverse_depth > options_.minimum_inverse_depth &&
+        linearityIndex(feature, sigmaInverseDepth(feature), camera_.position_world) <
+            options_.linearity_threshold) {
+      const int o = feature.offset;
+      const Eigen::Matrix3d own = positionCovariance(feature);
+      const Eigen::Matrix<double, 3, 6> J = positionJacobian(feature);
+      P.middleCols<3>(o) = (P.middleCols<6>(o) * J.transpose()).eval();
+      P.middleRows<3>(o) = P.middleCols<3>(o).transpose().eval();
+      P.block<3, 3>(o, o) = own;
+      feature.point_world = feature.position();
+      feature.kind = FeatureKind::kPoint;
+      converted.push_back(feature.id);
+    }
+    ranges.emplace_back(feature.offset, feature.size());
+  }
+  if (!converted.empty()) {
+    covariance_.keep(ranges);
+    assignOffsets();
+  }
+  return converted;
+}
+
+Eigen::Matrix3d Ekf::positionCovariance(const FeatureState& feature) const {
+  const auto P = covariance_.view();
+  if (feature.kind == FeatureKind::kPoint) return P.block<3, 3>(feature.offset, feature.offset);
+  const Eigen::Matrix<double, 3, 6> J = positionJacobian(feature);
+  const Eigen::Matrix3d covariance =
+      J * P.block<6, 6>(feature.offset, feature.offset) * J.transpose();
+  return 0.5 * (covariance + covariance.transpose());
+}
+
+double Ekf::sigmaInverseDepth(const FeatureState& feature) const {
+  if (feature.kind == FeatureKind::kPoint) return 0.0;
+  const int row = feature.offset + FeatureError::kInverseDepth;
+  return std::sqrt(std::max(0.0, covariance_.view()(row, row)));
+}
+
+}  // namespace active_matching_slam

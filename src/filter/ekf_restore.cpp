@@ -1,0 +1,106 @@
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "active_matching_slam/filter/ekf.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr double kUnitTolerance = 1e-6;  ///< of lengths and angles that must be one or right
+/// Correlations may exceed one by rounding only, which for all but certain rows is measured by the
+/// larger variance.
+constexpr double kCorrelationTolerance = 1e-3, kRounding = 1e-9;
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw std::invalid_argument("filter state: " + what);
+}
+
+bool isUnit(const Eigen::Vector3d& v) { return std::abs(v.norm() - 1.0) <= kUnitTolerance; }
+
+void checkCamera(const CameraState& camera) {
+  if (!camera.position_world.allFinite() || !camera.velocity_world.allFinite() ||
+      !camera.angular_velocity_camera.allFinite() || !camera.q_world_camera.coeffs().allFinite())
+    refuse("the camera is not finite");
+  if (std::abs(camera.q_world_camera.norm() - 1.0) > kUnitTolerance)
+    refuse("the camera's quaternion has length " + std::to_string(camera.q_world_camera.norm()) +
+           ", not 1");
+}
+
+void checkFeature(const FeatureState& feature) {
+  const std::string name = "feature " + std::to_string(feature.id);
+  if (feature.kind != FeatureKind::kInverseDepth && feature.kind != FeatureKind::kPoint)
+    refuse(name + " is of no known kind");
+  if (!feature.anchor_world.allFinite() || !feature.bearing_world.allFinite() ||
+      !feature.tangent_world.allFinite() || !std::isfinite(feature.inverse_depth) ||
+      !feature.point_world.allFinite())
+    refuse(name + " is not finite");
+  if (feature.kind == FeatureKind::kPoint) return;
+  if (!isUnit(feature.bearing_world) || !isUnit(feature.tangent_world) ||
+      std::abs(feature.bearing_world.dot(feature.tangent_world)) > kUnitTolerance)
+    refuse(name + " has a bearing and tangent that are not orthonormal");
+  if (!(feature.inverse_depth > 0.0))
+    refuse(name + " has inverse depth " + std::to_string(feature.inverse_depth) +
+           ", not in (0, inf)");
+}
+
+void checkCovariance(const Eigen::MatrixXd& P, int size) {
+  if (P.rows() != size || P.cols() != size)
+    refuse("covariance of " + std::to_string(P.rows()) + " x " + std::to_string(P.cols()) +
+           ", the state has " + std::to_string(size));
+  if (!P.allFinite()) refuse("the covariance is not finite");
+  const Eigen::VectorXd variance = P.diagonal();
+  if (!(variance.minCoeff() >= 0.0)) refuse("the covariance has a negative variance");
+  // Bounds by standard deviations: products of large variances would overflow.
+  const Eigen::VectorXd sigma = variance.cwiseSqrt();
+  for (int j = 0; j < size; ++j) {
+    for (int i = j + 1; i < size; ++i) {
+      const double bound = sigma[i] * sigma[j];
+      const double slack = kCorrelationTolerance * bound + kRounding * (variance[i] + variance[j]);
+      if (std::abs(P(i, j) - P(j, i)) > slack) refuse("the covariance is not symmetric");
+      if (std::abs(P(i, j)) > bound + slack) refuse("the covariance holds a correlation beyond 1");
+    }
+  }
+}
+
+}  // namespace
+
+void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& features,
+                  const Eigen::MatrixXd& covariance, FeatureId next_id) {
+  checkCamera(camera);
+  int size = CameraError::kSize;
+  FeatureId least_id = 0;
+  for (const FeatureState& feature : features) {
+    if (feature.id < least_id)
+      refuse("feature ids are not ascending at " + std::to_string(feature.id));
+    if (feature.id >= next_id)
+      refuse("feature id " + std::to_string(feature.id) + " is not below the next id " +
+             std::to_string(next_id));
+    least_id = feature.id + 1;
+    checkFeature(feature);
+    size += feature.size();
+  }
+  if (next_id < 0) refuse("the next id " + std::to_string(next_id) + " is negative");
+  checkCovariance(covariance, size);
+
+  camera_ = camera;
+  features_ = features;
+  assignOffsets();
+  covariance_.reset(size);
+  covariance_.view() = covariance;
+  covariance_.mirrorLower();
+  next_id_ = next_id;
+}
+
+void Ekf::relocateCamera(const CameraState& camera,
+                         const Eigen::Matrix<double, 12, 12>& covariance) {
+  camera_ = camera;
+  camera_.q_world_camera.normalize();
+  auto P = covariance_.view();
+  const int map_size = covariance_.size() - CameraError::kSize;
+  P.topLeftCorner<12, 12>() = 0.5 * (covariance + covariance.transpose());
+  P.topRightCorner(CameraError::kSize, map_size).setZero();
+  P.bottomLeftCorner(map_size, CameraError::kSize).setZero();
+}
+
+}  // namespace active_matching_slam

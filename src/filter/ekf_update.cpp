@@ -1,0 +1,127 @@
+#include <algorithm>
+#include <cmath>
+
+#include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/filter/measurement_model.h"
+#include "active_matching_slam/filter/state_error.h"
+#include "measurement_update.h"
+
+namespace active_matching_slam {
+
+PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
+                                               const std::vector<FeatureId>& ids) const {
+  PredictedMeasurements predicted;
+  MeasurementStack stack;
+  for (const FeatureId id : ids) {
+    const FeatureState* feature = find(id);
+    if (feature == nullptr) continue;
+    const auto projection = projectFeature(camera, camera_, *feature);
+    if (!projection) continue;
+    stack.add(*feature, *projection);
+    predicted.ids.push_back(id);
+  }
+  predicted.z = stack.pixels();
+  Eigen::MatrixXd PHt(covariance_.size(), stack.rows());
+  stack.crossCovariance(covariance_, PHt);
+  predicted.S = stack.innovationCovariance(PHt);
+  predicted.S.diagonal().array() += options_.sigma_px * options_.sigma_px;
+  for (std::size_t i = 0; i < predicted.ids.size(); ++i) {
+    const FeatureState& feature = *find(predicted.ids[i]);
+    if (feature.kind != FeatureKind::kInverseDepth) continue;
+    predicted.S.block<2, 2>(2 * i, 2 * i) +=
+        secondOrderNoise(stack.projection(i), relativeCovariance(feature, covariance_));
+  }
+  predicted.S.triangularView<Eigen::StrictlyUpper>() = predicted.S.transpose();
+  return predicted;
+}
+
+UpdateReport Ekf::update(const CameraModel& camera,
+                         const std::vector<FeatureMeasurement>& measurements) {
+  UpdateReport report;
+  std::vector<UsableMeasurement> usable;
+  for (const FeatureMeasurement& m : measurements) {
+    const int index = indexOf(m.id);
+    if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px)) continue;
+    if (!projectFeature(camera, camera_, features_[index])) continue;
+    const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
+    usable.push_back({index, m.pixel, sigma_px * sigma_px});
+  }
+  report.skipped = static_cast<int>(measurements.size() - usable.size());
+  if (usable.empty()) return report;
+
+  const int n = covariance_.size();
+  const int rows = 2 * static_cast<int>(usable.size());
+  const std::size_t room = static_cast<std::size_t>(n) * (rows + kGaugeFreedoms);
+  if (workspace_.size() < room) workspace_.resize(room);
+  Eigen::Map<Eigen::MatrixXd> X(workspace_.data(), n, rows + kGaugeFreedoms);
+  MeasurementUpdate correction(camera, camera_, features_, covariance_, usable, X.leftCols(rows));
+  if (!correction.solve(options_.update_iterations)) {
+    report.healthy = false;
+    return report;
+  }
+  correction.finish();
+  camera_ = correction.camera();
+  features_ = correction.features();
+  report.nis = correction.nis();
+  report.used = static_cast<int>(usable.size());
+  report.healthy = correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
+                                     correction.gaugeCovariance(), rows, X);
+  limitInverseDepths();
+  return report;
+}
+
+bool Ekf::correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
+                            const Eigen::MatrixXd& PL, int columns, Eigen::Ref<Eigen::MatrixXd> X) {
+  auto P = covariance_.view();
+  const Eigen::VectorXd variances_before = P.diagonal();
+  const auto measured = X.leftCols(columns);
+
+  // With P' = P - X X^T: M P' M^T = P' + C Y^T + Y C^T for Y = P' L + C (L^T P' L) / 2, and each
+  // column adds a difference of two squares: c y^T + y c^T = (a a^T - b b^T) / 2 with a = s c + y /
+  // s, b = s c - y / s. The b join the columns of X.
+  Eigen::MatrixXd Y = PL - measured * (measured.transpose() * L);
+  Y += 0.5 * C * (L.transpose() * Y).eval();
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(P.rows(), kGaugeFreedoms);
+  auto B = X.middleCols<kGaugeFreedoms>(columns);
+  B.setZero();
+  for (int k = 0; k < kGaugeFreedoms; ++k) {
+    const double norm_c = C.col(k).norm(), norm_y = Y.col(k).norm();
+    if (norm_c == 0.0 || norm_y == 0.0) continue;
+    const double s = std::sqrt(0.5 * norm_y / norm_c);
+    A.col(k) = s * C.col(k) + 0.5 / s * Y.col(k);
+    B.col(k) = s * C.col(k) - 0.5 / s * Y.col(k);
+  }
+  P.selfadjointView<Eigen::Lower>().rankUpdate(X, -1.0);
+  P.selfadjointView<Eigen::Lower>().rankUpdate(A, 1.0);
+  const bool sound = repairVariances(variances_before);
+  covariance_.mirrorLower();
+  return sound;
+}
+
+bool Ekf::repairVariances(const Eigen::VectorXd& before) {
+  constexpr double kRounding = 1e-9;
+  auto P = covariance_.view();
+  bool sound = true;
+  for (int i = 0; i < P.rows(); ++i) {
+    if (P(i, i) >= 0.0) continue;
+    if (P(i, i) >= -kRounding * before[i]) {
+      P(i, i) = 0.0;
+      continue;
+    }
+    // Safe, if wasteful: forget what the variable shares with others, keep what was known before.
+    P.col(i).tail(P.rows() - i).setZero();
+    P.row(i).head(i).setZero();
+    P(i, i) = before[i];
+    sound = false;
+  }
+  return sound;
+}
+
+void Ekf::limitInverseDepths() {
+  for (FeatureState& feature : features_) {
+    if (feature.kind == FeatureKind::kInverseDepth)
+      feature.inverse_depth = std::max(feature.inverse_depth, options_.minimum_inverse_depth);
+  }
+}
+
+}  // namespace active_matching_slam

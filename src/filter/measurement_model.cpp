@@ -1,0 +1,127 @@
+#include "active_matching_slam/filter/measurement_model.h"
+
+#include "active_matching_slam/filter/rotation.h"
+
+namespace active_matching_slam {
+
+std::optional<FeatureProjection> projectFeature(const CameraModel& model, const CameraState& camera,
+                                                const FeatureState& feature) {
+  const Eigen::Matrix3d R_camera_world = camera.q_world_camera.toRotationMatrix().transpose();
+  const bool is_point = feature.kind == FeatureKind::kPoint;
+  const double rho = is_point ? 1.0 : feature.inverse_depth;
+  const Eigen::Vector3d from_camera =
+      (is_point ? feature.point_world : feature.anchor_world) - camera.position_world;
+  Eigen::Vector3d ray_world = from_camera;
+  if (!is_point) ray_world = rho * from_camera + feature.bearing_world;
+
+  Eigen::Matrix<double, 2, 3> d_pixel_d_point;
+  const auto pixel = model.project(R_camera_world * ray_world, &d_pixel_d_point);
+  if (!pixel || !pixel->allFinite() || !d_pixel_d_point.allFinite()) return std::nullopt;
+
+  FeatureProjection projection;
+  projection.pixel = *pixel;
+  projection.d_ray = d_pixel_d_point * R_camera_world;
+  const auto& d_ray = projection.d_ray;
+  projection.d_camera << -rho * d_ray, d_ray * skew(ray_world);
+  if (is_point) {
+    projection.d_feature << d_ray, Eigen::Matrix<double, 2, 3>::Zero();
+  } else {
+    projection.d_feature << rho * d_ray, d_ray * feature.tangentBasis(), d_ray * from_camera;
+  }
+  return projection;
+}
+
+Eigen::Matrix4d relativeCovariance(const FeatureState& feature,
+                                   const CovarianceMatrix& covariance) {
+  const auto P = covariance.view();
+  const int anchor = feature.offset + FeatureError::kAnchor;
+  const int rho = feature.offset + FeatureError::kInverseDepth;
+  const Eigen::Matrix3d cross = P.block<3, 3>(anchor, CameraError::kPosition);
+  Eigen::Matrix4d V;
+  V.topLeftCorner<3, 3>() = P.block<3, 3>(anchor, anchor) +
+                            P.block<3, 3>(CameraError::kPosition, CameraError::kPosition) - cross -
+                            cross.transpose();
+  V.topRightCorner<3, 1>() =
+      P.block<3, 1>(anchor, rho) - P.block<3, 1>(CameraError::kPosition, rho);
+  V.bottomLeftCorner<1, 3>() = V.topRightCorner<3, 1>().transpose();
+  V(3, 3) = P(rho, rho);
+  return V;
+}
+
+Eigen::Matrix2d secondOrderNoise(const FeatureProjection& projection,
+                                 const Eigen::Matrix4d& relative) {
+  // var(x y) = var(x) var(y) + cov(x, y)^2 for zero means, Gaussian.
+  const Eigen::Vector2d cross = projection.d_ray * relative.topRightCorner<3, 1>();
+  const Eigen::Matrix2d along =
+      projection.d_ray * relative.topLeftCorner<3, 3>() * projection.d_ray.transpose();
+  return relative(3, 3) * along + cross * cross.transpose();
+}
+
+void MeasurementStack::clear() { blocks_.clear(); }
+
+void MeasurementStack::add(const FeatureState& feature, const FeatureProjection& projection) {
+  blocks_.push_back({feature.offset, feature.size(), projection});
+}
+
+Eigen::VectorXd MeasurementStack::pixels() const {
+  Eigen::VectorXd z(rows());
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    z.segment<2>(2 * i) = blocks_[i].projection.pixel;
+  return z;
+}
+
+Eigen::MatrixXd MeasurementStack::times(const Eigen::Ref<const Eigen::MatrixXd>& X) const {
+  Eigen::MatrixXd Y(rows(), X.cols());
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& b = blocks_[i];
+    Y.middleRows<2>(2 * i) =
+        b.projection.d_camera.lazyProduct(X.topRows<6>()) +
+        b.projection.d_feature.leftCols(b.size).lazyProduct(X.middleRows(b.offset, b.size));
+  }
+  return Y;
+}
+
+Eigen::MatrixXd MeasurementStack::cameraJacobian() const {
+  Eigen::MatrixXd H(rows(), 6);
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    H.middleRows<2>(2 * i) = blocks_[i].projection.d_camera;
+  return H;
+}
+
+void MeasurementStack::crossCovariance(const CovarianceMatrix& covariance,
+                                       Eigen::Ref<Eigen::MatrixXd> out) const {
+  const auto P = covariance.view();
+  out.noalias() = P.leftCols<6>() * cameraJacobian().transpose();
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& b = blocks_[i];
+    const auto& H = b.projection.d_feature;
+    auto target = out.middleCols<2>(2 * i);
+    if (b.size == 3) {
+      target += P.middleCols<3>(b.offset).lazyProduct(H.leftCols<3>().transpose());
+    } else {
+      target += P.middleCols<6>(b.offset).lazyProduct(H.transpose());
+    }
+  }
+}
+
+Eigen::MatrixXd MeasurementStack::innovationCovariance(
+    const Eigen::Ref<const Eigen::MatrixXd>& PHt) const {
+  Eigen::MatrixXd S(rows(), rows());
+  S.noalias() = cameraJacobian() * PHt.topRows<6>();
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& b = blocks_[i];
+    const auto& H = b.projection.d_feature;
+    for (std::size_t j = 0; j <= i; ++j) {
+      const auto cross = PHt.middleCols<2>(2 * j);
+      auto target = S.block<2, 2>(2 * i, 2 * j);
+      if (b.size == 3) {
+        target += H.leftCols<3>().lazyProduct(cross.middleRows<3>(b.offset));
+      } else {
+        target += H.lazyProduct(cross.middleRows<6>(b.offset));
+      }
+    }
+  }
+  return S;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,111 @@
+#include "measurement_update.h"
+
+#include "active_matching_slam/filter/state_error.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Linearisation is repeated when it missed by more than this, root mean square, in sigmas.
+constexpr double kNonlinearityTolerance = 0.2;
+
+}  // namespace
+
+MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState& camera,
+                                     const std::vector<FeatureState>& features,
+                                     const CovarianceMatrix& covariance,
+                                     const std::vector<UsableMeasurement>& measurements,
+                                     Eigen::Ref<Eigen::MatrixXd> X)
+    : model_(model),
+      prior_camera_(camera),
+      prior_features_(features),
+      covariance_(covariance),
+      measurements_(measurements),
+      X_(X),
+      camera_(camera),
+      features_(features) {
+  const int n = covariance.size();
+  z_.resize(2 * measurements.size());
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    z_.segment<2>(2 * i) = measurements[i].pixel;
+    const FeatureState& feature = features[measurements[i].feature];
+    moments_.push_back(feature.kind == FeatureKind::kInverseDepth
+                           ? relativeCovariance(feature, covariance)
+                           : Eigen::Matrix4d(Eigen::Matrix4d::Zero()));
+  }
+  delta_ = Eigen::VectorXd::Zero(n);
+  prior_gauge_ = gaugeGenerators(camera, features, n);
+  C_ = Eigen::MatrixXd::Zero(n, kGaugeFreedoms);
+  L_ = active_matching_slam::gaugeFunctionals(camera, features, covariance);
+  PL_ = covariance.view() * L_;
+}
+
+bool MeasurementUpdate::linearise() {
+  stack_.clear();
+  for (const UsableMeasurement& m : measurements_) {
+    const auto projection = projectFeature(model_, camera_, features_[m.feature]);
+    if (!projection) return false;
+    stack_.add(features_[m.feature], *projection);
+  }
+  return true;
+}
+
+void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) const {
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    auto block = S.block<2, 2>(2 * i, 2 * i);
+    block.diagonal().array() += measurements_[i].variance_px2;
+    if (moments_[i](3, 3) > 0.0) block += secondOrderNoise(stack_.projection(i), moments_[i]);
+  }
+}
+
+bool MeasurementUpdate::step(bool first) {
+  stack_.crossCovariance(covariance_, X_);
+  Eigen::VectorXd innovation = z_ - stack_.pixels();
+  Eigen::MatrixXd S;
+  if (first) {
+    S = stack_.innovationCovariance(X_);
+  } else {
+    // An error of the prior is M = I + C L^T times as large at the mean reached: H M for H.
+    const Eigen::MatrixXd HC = stack_.times(C_);
+    X_.noalias() += PL_ * HC.transpose();
+    S = stack_.innovationCovariance(X_);
+    S.noalias() += HC * (L_.transpose() * X_);
+    innovation += stack_.times(delta_) + HC * (L_.transpose() * delta_);
+  }
+  addNoise(S);
+  llt_.compute(S);
+  if (llt_.info() != Eigen::Success) return false;
+  const Eigen::VectorXd weighted = llt_.solve(innovation);
+  if (first) nis_ = innovation.dot(weighted);
+  delta_.noalias() = X_ * weighted;
+  if (!delta_.allFinite()) return false;
+  camera_ = prior_camera_;
+  features_ = prior_features_;
+  applyError(delta_, camera_, features_);
+  C_ = gaugeGenerators(camera_, features_, covariance_.size()) - prior_gauge_;
+  return true;
+}
+
+bool MeasurementUpdate::isLinearEnough(const Eigen::VectorXd& expected) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    sum += (stack_.projection(i).pixel - expected.segment<2>(2 * i)).squaredNorm() /
+           measurements_[i].variance_px2;
+  }
+  return sum < kNonlinearityTolerance * kNonlinearityTolerance * expected.size();
+}
+
+bool MeasurementUpdate::solve(int iterations) {
+  if (!linearise()) return false;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const Eigen::VectorXd last_delta = delta_;
+    const MeasurementStack last_stack = stack_;
+    if (!step(iteration == 0)) return false;
+    if (iteration + 1 == iterations || !linearise()) break;
+    if (isLinearEnough(last_stack.pixels() + last_stack.times(delta_ - last_delta))) break;
+  }
+  return true;
+}
+
+void MeasurementUpdate::finish() { llt_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(X_); }
+
+}  // namespace active_matching_slam

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <vector>
+
+#include "active_matching_slam/filter/measurement_model.h"
+
+namespace active_matching_slam {
+
+/// A measurement that can be fused.
+struct UsableMeasurement {
+  int feature;  ///< index
+  Eigen::Vector2d pixel;
+  double variance_px2;
+};
+
+/// The gain of one update, by repeated linearisation (Bell & Cathey 1993), with the noise of what
+/// linearisation leaves out. All errors count from the prior mean; the Jacobian of an iteration is
+/// that of the mean reached. The second-order noise stays the prior's: shrunk along with the
+/// posterior it trusted the wrong one of two explanations of a small first move, depths reversed,
+/// for good.
+class MeasurementUpdate {
+ public:
+  /// `X`: workspace, state size x 2 measurements.
+  MeasurementUpdate(const CameraModel& model, const CameraState& camera,
+                    const std::vector<FeatureState>& features, const CovarianceMatrix& covariance,
+                    const std::vector<UsableMeasurement>& measurements,
+                    Eigen::Ref<Eigen::MatrixXd> X);
+
+  /// False when S could not be factorised or the result is not finite: nothing is to be fused.
+  bool solve(int iterations);
+
+  /// Makes P - X X^T the covariance after the measurement, before the transport of the gauge.
+  void finish();
+
+  const CameraState& camera() const { return camera_; }
+  const std::vector<FeatureState>& features() const { return features_; }
+  double nis() const { return nis_; }
+  const Eigen::MatrixXd& gaugeChange() const { return C_; }       ///< state size x kGaugeFreedoms
+  const Eigen::MatrixXd& gaugeFunctionals() const { return L_; }  ///< likewise
+  const Eigen::MatrixXd& gaugeCovariance() const { return PL_; }  ///< P L
+
+ private:
+  bool linearise();
+  bool step(bool first);
+  void addNoise(Eigen::MatrixXd& S) const;
+  bool isLinearEnough(const Eigen::VectorXd& expected_pixels) const;
+
+  const CameraModel& model_;
+  const CameraState& prior_camera_;
+  const std::vector<FeatureState>& prior_features_;
+  const CovarianceMatrix& covariance_;
+  const std::vector<UsableMeasurement>& measurements_;
+  Eigen::Ref<Eigen::MatrixXd> X_;  ///< P H^T, at the end P H^T U^-T with S = U U^T
+
+  CameraState camera_;
+  std::vector<FeatureState> features_;
+  MeasurementStack stack_;
+  Eigen::VectorXd z_, delta_;
+  Eigen::MatrixXd prior_gauge_, C_, L_, PL_;
+  Eigen::LLT<Eigen::MatrixXd> llt_;
+  std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points
+  double nis_ = 0.0;
+};
+
+}  // namespace active_matching_slam

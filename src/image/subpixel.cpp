@@ -1,0 +1,154 @@
+#include "active_matching_slam/image/subpixel.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "cubic_sampling.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Rows are padded to this many numbers, so that loops along them vectorise.
+constexpr int kStride = 36;
+constexpr int kLargestSide = Template::kMaximumSize + 2;
+static_assert(kStride >= kLargestSide, "a row holds the template and a rim");
+
+int roundedUp(int count) { return (count + 3) / 4 * 4; }
+
+/// Interpolated side x side window of the image whose first sample lies at (u, v); false when its
+/// support leaves the image. The fractional shift is the same everywhere, so it is separable.
+bool sampleWindow(const cv::Mat& image, double u, double v, int side, float* window) {
+  const int first_u = static_cast<int>(std::floor(u)), first_v = static_cast<int>(std::floor(v));
+  if (first_u < 1 || first_v < 1 || first_u + side + 1 >= image.cols ||
+      first_v + side + 1 >= image.rows)
+    return false;
+  float a[4], b[4];
+  cubicWeights(u - first_u, a);
+  cubicWeights(v - first_v, b);
+  std::array<float, (kLargestSide + 3) * kStride> along;
+  for (int j = 0; j < side + 3; ++j) {
+    const std::uint8_t* grey = image.ptr<std::uint8_t>(first_v - 1 + j) + first_u - 1;
+    float* to = &along[j * kStride];
+    for (int i = 0; i < side; ++i)
+      to[i] = a[0] * grey[i] + a[1] * grey[i + 1] + a[2] * grey[i + 2] + a[3] * grey[i + 3];
+  }
+  for (int j = 0; j < side; ++j) {
+    const float *r0 = &along[j * kStride], *r1 = r0 + kStride, *r2 = r1 + kStride;
+    const float* r3 = r2 + kStride;
+    float* to = &window[j * kStride];
+    for (int i = 0; i < side; ++i)
+      to[i] = b[0] * r0[i] + b[1] * r1[i] + b[2] * r2[i] + b[3] * r3[i];
+  }
+  return true;
+}
+
+/// Normal equations of t ~ x0 I + x1 I_u + x2 I_v + x3 over the template. Grey levels are given
+/// less `mean`. Sums run along columns first: a fixed order, and four at a time.
+class NormalEquations {
+ public:
+  NormalEquations(const float* window, const float* wanted, int size, float mean) {
+    const int lanes = roundedUp(size);
+    float sums[kSums][kStride] = {};
+    for (int j = 0; j < size; ++j) {
+      const float* at = window + (j + 1) * kStride + 1;
+      // Beyond the template all stay zero: the row adds nothing there.
+      float grey[kStride] = {}, slope_u[kStride] = {}, slope_v[kStride] = {};
+      for (int i = 0; i < size; ++i) {
+        grey[i] = at[i] - mean;
+        slope_u[i] = 0.5f * (at[i + 1] - at[i - 1]);
+        slope_v[i] = 0.5f * (at[i + kStride] - at[i - kStride]);
+      }
+      const float* t = wanted + j * kStride;
+      for (int i = 0; i < lanes; ++i) {
+        sums[0][i] += grey[i] * grey[i];
+        sums[1][i] += grey[i] * slope_u[i];
+        sums[2][i] += grey[i] * slope_v[i];
+        sums[3][i] += grey[i];
+        sums[4][i] += slope_u[i] * slope_u[i];
+        sums[5][i] += slope_u[i] * slope_v[i];
+        sums[6][i] += slope_u[i];
+        sums[7][i] += slope_v[i] * slope_v[i];
+        sums[8][i] += slope_v[i];
+        sums[9][i] += grey[i] * t[i];
+        sums[10][i] += slope_u[i] * t[i];
+        sums[11][i] += slope_v[i] * t[i];
+        sums[12][i] += t[i];
+      }
+    }
+    std::array<double, kSums> s{};
+    for (int k = 0; k < kSums; ++k)
+      for (int i = 0; i < lanes; ++i) s[k] += sums[k][i];
+    left_ << s[0], s[1], s[2], s[3], s[1], s[4], s[5], s[6], s[2], s[5], s[7], s[8], s[3], s[6],
+        s[8], size * size;
+    right_ << s[9], s[10], s[11], s[12];
+  }
+
+  /// Empty when they are singular: nothing there, or an edge that slides along itself.
+  std::optional<Eigen::Vector4d> solve() const {
+    const Eigen::LDLT<Eigen::Matrix4d> solver(left_);
+    const Eigen::Vector4d pivots = solver.vectorD();
+    if (!(pivots.minCoeff() > 1e-6 * pivots.maxCoeff())) return std::nullopt;
+    return solver.solve(right_);
+  }
+
+ private:
+  static constexpr int kSums = 13;
+  Eigen::Matrix4d left_;
+  Eigen::Vector4d right_;
+};
+
+}  // namespace
+
+Eigen::Vector2d paraboloidPeak(const float s[9]) {
+  // Least squares on the 3 x 3 grid of f = a + b u + c v + d u^2 + e u v + g v^2.
+  const double left = double(s[0]) + s[3] + s[6], right = double(s[2]) + s[5] + s[8];
+  const double top = double(s[0]) + s[1] + s[2], bottom = double(s[6]) + s[7] + s[8];
+  const double middle_u = double(s[1]) + s[4] + s[7], middle_v = double(s[3]) + s[4] + s[5];
+  const double b = (right - left) / 6.0, c = (bottom - top) / 6.0;
+  const double d = (left + right - 2.0 * middle_u) / 6.0;
+  const double g = (top + bottom - 2.0 * middle_v) / 6.0;
+  const double e = (double(s[0]) + s[8] - s[2] - s[6]) / 4.0;
+  const double determinant = 4.0 * d * g - e * e;
+  if (!(determinant > 1e-12) || !(d < 0.0)) return Eigen::Vector2d::Zero();
+  return {std::clamp((e * c - 2.0 * g * b) / determinant, -0.5, 0.5),
+          std::clamp((e * b - 2.0 * d * c) / determinant, -0.5, 0.5)};
+}
+
+std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Template& patch,
+                                              const Eigen::Vector2d& start) {
+  constexpr int kIterations = 10;
+  // The error left after a step is a fraction of it.
+  constexpr double kConverged = 0.01, kLargestMove = 1.0;
+  const int size = patch.size, side = size + 2;  // a rim for central differences
+  if (size < 3 || patch.energy <= 0 || image.type() != CV_8UC1 || !start.allFinite() ||
+      start.cwiseAbs().maxCoeff() > 1e6)
+    return std::nullopt;
+
+  const float mean = static_cast<float>(patch.sum) / static_cast<float>(size * size);
+  std::array<float, Template::kMaximumSize * kStride> wanted;
+  for (int j = 0; j < size; ++j)
+    for (int i = 0; i < kStride; ++i)
+      wanted[j * kStride + i] = i < size ? patch.at(j, i) - mean : 0;
+
+  // t ~ gain (I + I_u du + I_v dv) + offset is linear in (gain, gain du, gain dv, offset). The
+  // image explains the template and not the other way round: then the residual is the template's
+  // own energy times 1 - ZNCC^2, and the least is where the ZNCC is highest, blurred image or not.
+  Eigen::Vector2d pixel = start;
+  std::array<float, kLargestSide * kStride> window;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    if (!sampleWindow(image, pixel.x() - side / 2, pixel.y() - side / 2, side, window.data()))
+      return std::nullopt;
+    const std::optional<Eigen::Vector4d> x =
+        NormalEquations(window.data(), wanted.data(), size, mean).solve();
+    if (!x || !((*x)[0] > 0.05)) return std::nullopt;  // inverted or vanished contrast
+    const Eigen::Vector2d step = x->segment<2>(1) / (*x)[0];
+    pixel += step;
+    if (!((pixel - start).norm() <= kLargestMove)) return std::nullopt;
+    if (step.norm() < kConverged) return pixel;
+  }
+  return std::nullopt;
+}
+
+}  // namespace active_matching_slam

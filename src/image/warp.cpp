@@ -1,0 +1,128 @@
+#include "active_matching_slam/image/warp.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "active_matching_slam/filter/ekf.h"
+#include "cubic_sampling.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Cubic interpolation for positions from (-0.5, -0.5) on; beyond the rim the outermost pixels
+/// repeat.
+float sample(const cv::Mat& image, double u, double v) {
+  // Truncation is the floor of what is positive, and far cheaper.
+  const int at_u = static_cast<int>(u + 1.0) - 1, at_v = static_cast<int>(v + 1.0) - 1;
+  float weights_u[4], weights_v[4];
+  cubicWeights(u - at_u, weights_u);
+  cubicWeights(v - at_v, weights_v);
+  int columns[4];
+  for (int i = 0; i < 4; ++i) columns[i] = std::clamp(at_u - 1 + i, 0, image.cols - 1);
+  float value = 0.0f;
+  for (int j = 0; j < 4; ++j) {
+    const std::uint8_t* row = image.ptr<std::uint8_t>(std::clamp(at_v - 1 + j, 0, image.rows - 1));
+    float along = 0.0f;
+    for (int i = 0; i < 4; ++i) along += weights_u[i] * row[columns[i]];
+    value += weights_v[j] * along;
+  }
+  return value;
+}
+
+/// How many samples a side stand for one template pixel: more where the patch shrinks, lest fine
+/// texture turns into noise.
+int samplesPerPixel(const Eigen::Matrix2d& source_per_pixel) {
+  const double longest = std::max(source_per_pixel.col(0).norm(), source_per_pixel.col(1).norm());
+  return std::clamp(static_cast<int>(std::lround(longest)), 1, 4);
+}
+
+}  // namespace
+
+Eigen::Vector4d homogeneousPosition(const FeatureState& feature) {
+  Eigen::Vector4d point;
+  if (feature.kind == FeatureKind::kPoint) {
+    point << feature.point_world, 1.0;
+  } else {
+    const double rho = std::max(feature.inverse_depth, 0.0);
+    point << rho * feature.anchor_world + feature.bearing_world, rho;
+  }
+  return point;
+}
+
+std::optional<PatchView> predictPatchView(const SourcePatch& patch, const CameraModel& camera,
+                                          const Eigen::Isometry3d& T_world_camera_now,
+                                          const Eigen::Vector4d& point_world_homogeneous) {
+  const Eigen::Isometry3d& T_world_first = patch.T_world_camera;
+  const double w = point_world_homogeneous.w();
+  const double distance =
+      (point_world_homogeneous.head<3>() - w * T_world_first.translation()).norm();
+  if (!(distance > 0.0) || !(w >= 0.0)) return std::nullopt;
+  const double inverse_distance = w / distance;  // from the first camera
+  if (!std::isfinite(inverse_distance)) return std::nullopt;
+
+  Eigen::Matrix<double, 3, 2> d_bearing_d_first;
+  const std::optional<Eigen::Vector3d> bearing = camera.unproject(patch.pixel, &d_bearing_d_first);
+  if (!bearing) return std::nullopt;
+
+  // The plane n^T X = -d through the point with n = -bearing: X = b d / (b . bearing) along a ray
+  // b, so R X + t is parallel to (R + t bearing^T / d) b. (Hartley & Zisserman 2004, section 13.1)
+  const Eigen::Matrix3d R_now_world = T_world_camera_now.linear().transpose();
+  const Eigen::Matrix3d R_now_first = R_now_world * T_world_first.linear();
+  const Eigen::Vector3d t_now_first =
+      R_now_world * (T_world_first.translation() - T_world_camera_now.translation());
+  const Eigen::Matrix3d homography =
+      R_now_first + inverse_distance * t_now_first * bearing->transpose();
+  const Eigen::Vector3d point_now = homography * *bearing;
+
+  Eigen::Matrix<double, 2, 3> d_now_d_point;
+  const std::optional<Eigen::Vector2d> pixel = camera.project(point_now, &d_now_d_point);
+  if (!pixel) return std::nullopt;
+
+  PatchView view;
+  view.pixel = *pixel;
+  view.affine = d_now_d_point * homography * d_bearing_d_first;
+  if (!view.pixel.allFinite() || !view.affine.allFinite()) return std::nullopt;
+  view.scale = std::sqrt(std::abs(view.affine.determinant()));
+  const Eigen::Vector3d first_ray = R_now_first * *bearing;
+  view.view_angle_rad = std::atan2(first_ray.cross(point_now).norm(), first_ray.dot(point_now));
+  return view;
+}
+
+bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_size_px,
+                  Template* result) {
+  result->size = 0;
+  result->sum = result->energy = 0;
+  if (template_size_px < 1 || template_size_px > Template::kMaximumSize || patch.image.empty() ||
+      !(view.affine.determinant() > 1e-6))  // a mirrored or edge-on plane shows nothing
+    return false;
+  const Eigen::Matrix2d source_per_pixel = view.affine.inverse();
+  const int half = template_size_px / 2;
+  const Eigen::Vector2d reach = source_per_pixel.cwiseAbs() * Eigen::Vector2d(half, half);
+  const Eigen::Vector2d last(patch.image.cols - 0.5, patch.image.rows - 0.5);
+  if (!((patch.center - reach).minCoeff() >= -0.5) ||
+      !((last - patch.center - reach).minCoeff() >= 0.0))
+    return false;
+
+  const int samples = samplesPerPixel(source_per_pixel);
+  const double step = 1.0 / samples, first = 0.5 * (step - 1.0);
+  std::uint8_t* pixel = result->pixels.data();
+  for (int dv = -half; dv <= half; ++dv) {
+    for (int du = -half; du <= half; ++du) {
+      double total = 0.0;
+      for (int j = 0; j < samples; ++j)
+        for (int i = 0; i < samples; ++i) {
+          const Eigen::Vector2d offset(du + first + i * step, dv + first + j * step);
+          const Eigen::Vector2d source = patch.center + source_per_pixel * offset;
+          total += sample(patch.image, source.x(), source.y());
+        }
+      const double value = std::clamp(total * step * step, 0.0, 255.0);
+      *pixel++ = static_cast<std::uint8_t>(value + 0.5);
+    }
+  }
+  result->size = template_size_px;
+  updateSums(result);
+  return true;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,29 @@
+#include "active_matching_slam/information/map_structure.h"
+
+namespace active_matching_slam {
+
+void MapStructure::addFrame(const std::vector<std::int64_t>& ids,
+                            const Eigen::Ref<const Eigen::MatrixXd>& S) {
+  accumulator_.addFrame(ids, S);
+}
+
+void MapStructure::keepOnly(const std::vector<std::int64_t>& ids) { accumulator_.keepOnly(ids); }
+
+void MapStructure::clear() {
+  accumulator_.clear();
+  tracker_.clear();
+}
+
+MapStructure::Snapshot MapStructure::snapshot() {
+  auto graph = std::make_shared<MutualInformationGraph>(accumulator_.links());
+  auto submaps = std::make_shared<SubmapHierarchy>(buildSubmapHierarchy(*graph));
+  tracker_.relabel(*submaps);
+  return {std::move(graph), std::move(submaps)};
+}
+
+void MapStructure::restore(const MutualInformationGraph& graph) {
+  accumulator_ = MutualInformationAccumulator(graph);
+  tracker_.clear();
+}
+
+}  // namespace active_matching_slam

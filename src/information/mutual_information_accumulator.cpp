@@ -1,0 +1,126 @@
+#include "active_matching_slam/information/mutual_information_accumulator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "active_matching_slam/information/pair_dependence.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Indices of the frame's features by ascending id.
+std::vector<int> orderById(const std::vector<std::int64_t>& ids) {
+  std::vector<int> order(ids.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return ids[a] < ids[b]; });
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    if (ids[order[k - 1]] == ids[order[k]]) {
+      throw std::invalid_argument("ids holds " + std::to_string(ids[order[k]]) +
+                                  " twice, allowed: once");
+    }
+  }
+  return order;
+}
+
+}  // namespace
+
+MutualInformationAccumulator::MutualInformationAccumulator(const MutualInformationGraph& graph) {
+  graphEdges(graph);
+  for (std::int64_t id : graph.ids) features_[id];
+  for (const InformationLink& link : graph.links) {
+    if (!(link.information_bits >= 0.0 && std::isfinite(link.information_bits)) ||
+        link.frames < 1) {
+      throw std::invalid_argument(
+          "link (" + std::to_string(link.first) + ", " + std::to_string(link.second) + ") of " +
+          std::to_string(link.information_bits) + " bits and " + std::to_string(link.frames) +
+          " frames, allowed: finite, 0 or more, and 1 or more");
+    }
+    features_[link.first].push_back(
+        {link.second, link.information_bits * link.frames, link.frames});
+  }
+}
+
+void MutualInformationAccumulator::addFrame(const std::vector<std::int64_t>& ids,
+                                            const Eigen::Ref<const Eigen::MatrixXd>& S) {
+  const Eigen::Index rows = 2 * static_cast<Eigen::Index>(ids.size());
+  if (S.rows() != rows || S.cols() != rows) {
+    throw std::invalid_argument("S is " + std::to_string(S.rows()) + " x " +
+                                std::to_string(S.cols()) + ", allowed: " + std::to_string(rows) +
+                                " x " + std::to_string(rows));
+  }
+  struct Seen {
+    std::int64_t id;
+    int index;
+    Whitening whitening;
+  };
+  std::vector<Seen> seen;
+  seen.reserve(ids.size());
+  for (int i : orderById(ids)) {
+    const Whitening whitening = Whitening::of(S.block<2, 2>(2 * i, 2 * i));
+    if (whitening.usable) seen.push_back({ids[i], i, whitening});
+  }
+  for (std::size_t a = 0; a < seen.size(); ++a) {
+    Partners& partners = features_[seen[a].id];
+    std::size_t known = 0;
+    Partners added;
+    for (std::size_t b = a + 1; b < seen.size(); ++b) {
+      // Columns of the first feature: one contiguous walk down S.
+      const int i = 2 * seen[a].index, k = 2 * seen[b].index;
+      const double odds = dependenceOdds(seen[b].whitening, seen[a].whitening, S(k, i), S(k + 1, i),
+                                         S(k, i + 1), S(k + 1, i + 1));
+      const double bits = std::isfinite(odds) ? oddsToBits(odds) : 0.0;
+      while (known < partners.size() && partners[known].id < seen[b].id) ++known;
+      if (known < partners.size() && partners[known].id == seen[b].id) {
+        partners[known].sum_bits += bits;
+        ++partners[known].frames;
+      } else {
+        added.push_back({seen[b].id, bits, 1});
+      }
+    }
+    if (added.empty()) continue;
+    const auto middle = static_cast<std::ptrdiff_t>(partners.size());
+    partners.insert(partners.end(), added.begin(), added.end());
+    std::inplace_merge(partners.begin(), partners.begin() + middle, partners.end(),
+                       [](const Partner& x, const Partner& y) { return x.id < y.id; });
+  }
+}
+
+void MutualInformationAccumulator::remove(std::int64_t id) {
+  if (features_.erase(id) == 0) return;
+  for (auto& [lower, partners] : features_) {
+    if (lower > id) break;
+    const auto at = std::lower_bound(partners.begin(), partners.end(), id,
+                                     [](const Partner& p, std::int64_t x) { return p.id < x; });
+    if (at != partners.end() && at->id == id) partners.erase(at);
+  }
+}
+
+void MutualInformationAccumulator::keepOnly(std::vector<std::int64_t> ids) {
+  std::sort(ids.begin(), ids.end());
+  std::vector<std::int64_t> gone;
+  for (const auto& feature : features_) {
+    if (!std::binary_search(ids.begin(), ids.end(), feature.first)) gone.push_back(feature.first);
+  }
+  for (std::int64_t id : gone) remove(id);
+}
+
+MutualInformationGraph MutualInformationAccumulator::links() const {
+  MutualInformationGraph graph;
+  std::size_t count = 0;
+  for (const auto& feature : features_) count += feature.second.size();
+  graph.ids.reserve(features_.size());
+  graph.links.reserve(count);
+  for (const auto& [id, partners] : features_) {
+    graph.ids.push_back(id);
+    for (const Partner& partner : partners) {
+      graph.links.push_back(
+          {id, partner.id, partner.sum_bits / partner.frames, partner.frames, false});
+    }
+  }
+  return graph;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,157 @@
+#include "active_matching_slam/map/feature_map.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace active_matching_slam {
+namespace {
+
+constexpr int kGridColumns = 8, kGridRows = 6;
+
+bool byId(const MapFeature& a, FeatureId id) { return a.id < id; }
+
+constexpr double kRateMemory = 0.9;  ///< of the recent rate, a search
+
+}  // namespace
+
+const MapFeature* FeatureMap::find(FeatureId id) const {
+  const auto it = std::lower_bound(features_.begin(), features_.end(), id, byId);
+  return it != features_.end() && it->id == id ? &*it : nullptr;
+}
+
+void FeatureMap::clear() { features_.clear(); }
+
+void FeatureMap::add(MapFeature feature) {
+  features_.insert(std::lower_bound(features_.begin(), features_.end(), feature.id, byId),
+                   std::move(feature));
+}
+
+void FeatureMap::retire(const std::vector<FeatureId>& ids) {
+  const auto gone = [&](const MapFeature& f) {
+    return std::find(ids.begin(), ids.end(), f.id) != ids.end();
+  };
+  const auto end = std::remove_if(features_.begin(), features_.end(), gone);
+  retired_total_ += std::distance(end, features_.end());
+  features_.erase(end, features_.end());
+}
+
+void FeatureMap::rescale(double factor) {
+  for (MapFeature& feature : features_) feature.patch.T_world_camera.translation() *= factor;
+}
+
+std::vector<VisibleFeature> FeatureMap::visible(const Ekf& filter, const CameraModel& camera,
+                                                const MapOptions& options, double border_px) const {
+  std::vector<VisibleFeature> result;
+  const Eigen::Isometry3d T_world_camera = filter.camera().poseWorldCamera();
+  const double maximum_angle = options.maximum_view_angle_deg * M_PI / 180.0;
+  for (const MapFeature& feature : features_) {
+    const FeatureState* state = filter.find(feature.id);
+    if (!state) continue;
+    const auto view =
+        predictPatchView(feature.patch, camera, T_world_camera, homogeneousPosition(*state));
+    if (!view || !camera.isInImage(view->pixel, border_px)) continue;
+    if (view->view_angle_rad > maximum_angle || view->scale < options.minimum_scale ||
+        view->scale > options.maximum_scale)
+      continue;
+    result.push_back({feature.id, *view});
+  }
+  return result;
+}
+
+std::vector<VisibleFeature> FeatureMap::choose(const std::vector<VisibleFeature>& visible,
+                                               const CameraModel& camera, int wanted) const {
+  if (static_cast<int>(visible.size()) <= wanted) return visible;
+  struct Entry {
+    double rate;
+    const VisibleFeature* feature;
+  };
+  std::vector<std::vector<Entry>> cells(kGridColumns * kGridRows);
+  std::vector<VisibleFeature> chosen;
+  for (const VisibleFeature& v : visible) {
+    const MapFeature& feature = *find(v.id);
+    if (feature.known) {
+      chosen.push_back(v);
+      continue;
+    }
+    const auto cell = [](double x, int size, int cells) {
+      return std::clamp(static_cast<int>(x * cells / size), 0, cells - 1);
+    };
+    const int column = cell(v.view.pixel.x(), camera.width(), kGridColumns);
+    const int row = cell(v.view.pixel.y(), camera.height(), kGridRows);
+    cells[row * kGridColumns + column].push_back({feature.recent_rate, &v});
+  }
+  for (auto& cell : cells)
+    std::stable_sort(cell.begin(), cell.end(),
+                     [](const Entry& a, const Entry& b) { return a.rate > b.rate; });
+  for (std::size_t rank = 0; static_cast<int>(chosen.size()) < wanted; ++rank)
+    for (const auto& cell : cells)
+      if (rank < cell.size() && static_cast<int>(chosen.size()) < wanted)
+        chosen.push_back(*cell[rank].feature);
+  std::sort(chosen.begin(), chosen.end(),
+            [](const VisibleFeature& a, const VisibleFeature& b) { return a.id < b.id; });
+  return chosen;
+}
+
+void FeatureMap::record(const std::vector<SearchRecord>& searches, std::int64_t frame) {
+  const auto matched = std::count_if(searches.begin(), searches.end(),
+                                     [](const SearchRecord& s) { return s.matched; });
+  const bool image_at_fault = 3 * matched < static_cast<std::ptrdiff_t>(searches.size());
+  for (const SearchRecord& search : searches) {
+    const auto it = std::lower_bound(features_.begin(), features_.end(), search.id, byId);
+    if (it == features_.end() || it->id != search.id) continue;
+    if (!search.matched && image_at_fault) continue;
+    ++it->attempts;
+    it->rates.add(search.matched, search.matches, search.pixels);
+    it->recent_rate = kRateMemory * it->recent_rate + (search.matched ? 1.0 - kRateMemory : 0.0);
+    if (search.matched) {
+      ++it->successes;
+      it->last_matched_frame = frame;
+    }
+  }
+}
+
+double FeatureMap::expectedMatches(const std::vector<VisibleFeature>& visible) const {
+  double sum = 0.0;
+  for (const VisibleFeature& feature : visible) sum += find(feature.id)->recent_rate;
+  return sum;
+}
+
+std::vector<FeatureId> FeatureMap::failing(const MapOptions& options) const {
+  std::vector<FeatureId> ids;
+  for (const MapFeature& feature : features_)
+    if (!feature.known && feature.attempts >= options.retire_after_attempts &&
+        (feature.successes < options.retire_success_ratio * feature.attempts ||
+         feature.recent_rate < 0.5 * options.retire_success_ratio))
+      ids.push_back(feature.id);
+  return ids;
+}
+
+std::vector<FeatureId> FeatureMap::leastInformative(const Ekf& filter, int count) const {
+  struct Entry {
+    double distance;
+    FeatureId id;
+  };
+  std::vector<Entry> entries;
+  const Eigen::Isometry3d T_world_camera = filter.camera().poseWorldCamera();
+  for (const MapFeature& feature : features_) {
+    const FeatureState* state = filter.find(feature.id);
+    if (feature.known || !state) continue;
+    const Eigen::Vector4d point = homogeneousPosition(*state);
+    const Eigen::Vector3d ray = point.head<3>() - point.w() * T_world_camera.translation();
+    const double cosine = ray.normalized().dot(T_world_camera.linear().col(2));
+    const double baseline =
+        (T_world_camera.translation() - feature.patch.T_world_camera.translation()).norm();
+    const double inverse_distance = point.w() / std::max(ray.norm(), 1e-12);
+    entries.push_back({std::acos(std::clamp(cosine, -1.0, 1.0)) + baseline * inverse_distance +
+                           (1.0 - feature.recent_rate),
+                       feature.id});
+  }
+  std::stable_sort(entries.begin(), entries.end(),
+                   [](const Entry& a, const Entry& b) { return a.distance > b.distance; });
+  std::vector<FeatureId> ids;
+  for (int i = 0; i < count && i < static_cast<int>(entries.size()); ++i)
+    ids.push_back(entries[i].id);
+  return ids;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,338 @@
+#include <boost/crc.hpp>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+#include "active_matching_slam/image/image_options.h"
+#include "active_matching_slam/map/map_file.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Both line ends reveal a transfer as text.
+constexpr char kMagic[9] = "AMSMAP\r\n";
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kHeaderSize = 8 + 4 + 4 + 8;
+constexpr std::size_t kMaximumName = 1024, kMaximumDistortion = 16;
+constexpr std::size_t kMinimumFeature = 8 + 1 + 13 * 8;  ///< bytes of a FeatureState
+constexpr int kMaximumPatchSize = 255;
+
+class Writer {
+ public:
+  void bytes(const void* data, std::size_t size) {
+    out_.append(static_cast<const char*>(data), size);
+  }
+  template <typename Unsigned>
+  void number(Unsigned value) {
+    for (std::size_t i = 0; i < sizeof(value); ++i)
+      out_.push_back(static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i) & 0xff));
+  }
+  void integer(std::int64_t value) { number(static_cast<std::uint64_t>(value)); }
+  void real(double value) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &value, sizeof(bits));
+    number(bits);
+  }
+  template <typename Derived>
+  void reals(const Eigen::MatrixBase<Derived>& values) {
+    for (Eigen::Index j = 0; j < values.cols(); ++j)
+      for (Eigen::Index i = 0; i < values.rows(); ++i) real(values(i, j));
+  }
+  const std::string& content() const { return out_; }
+
+ private:
+  std::string out_;
+};
+
+class Reader {
+ public:
+  Reader(const std::string& bytes, std::size_t offset) : bytes_(bytes), offset_(offset) {}
+
+  std::size_t remaining() const { return bytes_.size() - offset_; }
+  const char* bytes(std::size_t size) {
+    if (size > remaining()) throw std::runtime_error("it ends too early");
+    offset_ += size;
+    return bytes_.data() + (offset_ - size);
+  }
+  template <typename Unsigned>
+  Unsigned number() {
+    const char* data = bytes(sizeof(Unsigned));
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < sizeof(Unsigned); ++i)
+      value |= static_cast<std::uint64_t>(static_cast<unsigned char>(data[i])) << (8 * i);
+    return static_cast<Unsigned>(value);
+  }
+  std::int64_t integer() { return static_cast<std::int64_t>(number<std::uint64_t>()); }
+  /// An integer within [low, high]; the error names it.
+  std::int64_t integer(const char* name, std::int64_t low, std::int64_t high) {
+    const std::int64_t value = integer();
+    if (value < low || value > high)
+      throw std::runtime_error(std::string(name) + " = " + std::to_string(value) + " is outside [" +
+                               std::to_string(low) + ", " + std::to_string(high) + "]");
+    return value;
+  }
+  int smallInteger(const char* name, int low, int high) {
+    return static_cast<int>(integer(name, low, high));
+  }
+  double real() {
+    const auto bits = number<std::uint64_t>();
+    double value;
+    std::memcpy(&value, &bits, sizeof(value));
+    if (!std::isfinite(value)) throw std::runtime_error("it holds a number that is not finite");
+    return value;
+  }
+  template <typename Derived>
+  void reals(Eigen::MatrixBase<Derived>& values) {
+    for (Eigen::Index j = 0; j < values.cols(); ++j)
+      for (Eigen::Index i = 0; i < values.rows(); ++i) values(i, j) = real();
+  }
+  bool flag() { return smallInteger("flag", 0, 1) != 0; }
+
+ private:
+  const std::string& bytes_;
+  std::size_t offset_;
+};
+
+void write(const CameraCalibration& camera, Writer* out) {
+  out->integer(static_cast<std::int64_t>(camera.name.size()));
+  out->bytes(camera.name.data(), camera.name.size());
+  out->integer(camera.width);
+  out->integer(camera.height);
+  for (double value : {camera.fx, camera.fy, camera.cx, camera.cy}) out->real(value);
+  out->integer(static_cast<int>(camera.distortion_model));
+  out->integer(static_cast<std::int64_t>(camera.distortion.size()));
+  for (double value : camera.distortion) out->real(value);
+}
+
+CameraCalibration readCamera(Reader* in) {
+  CameraCalibration camera;
+  const std::size_t name_size = in->integer("length of the camera's name", 0, kMaximumName);
+  camera.name.assign(in->bytes(name_size), name_size);
+  constexpr int kMaximumSide = 1 << 16;
+  camera.width = in->smallInteger("image width", 1, kMaximumSide);
+  camera.height = in->smallInteger("image height", 1, kMaximumSide);
+  for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value = in->real();
+  camera.distortion_model = static_cast<DistortionModel>(
+      in->smallInteger("distortion model", 0, static_cast<int>(DistortionModel::kEquidistant)));
+  camera.distortion.resize(in->integer("number of distortion values", 0, kMaximumDistortion));
+  for (double& value : camera.distortion) value = in->real();
+  return camera;
+}
+
+void write(const CameraState& camera, Writer* out) {
+  out->reals(camera.position_world);
+  out->reals(camera.q_world_camera.coeffs());
+  out->reals(camera.velocity_world);
+  out->reals(camera.angular_velocity_camera);
+}
+
+CameraState readCameraState(Reader* in) {
+  CameraState camera;
+  in->reals(camera.position_world);
+  in->reals(camera.q_world_camera.coeffs());
+  in->reals(camera.velocity_world);
+  in->reals(camera.angular_velocity_camera);
+  return camera;
+}
+
+void write(const FeatureState& feature, Writer* out) {
+  out->integer(feature.id);
+  out->number(static_cast<std::uint8_t>(feature.kind == FeatureKind::kPoint));
+  out->reals(feature.anchor_world);
+  out->reals(feature.bearing_world);
+  out->reals(feature.tangent_world);
+  out->real(feature.inverse_depth);
+  out->reals(feature.point_world);
+}
+
+FeatureState readFeatureState(Reader* in, int offset) {
+  FeatureState feature;
+  feature.id = in->integer();
+  const auto kind = in->number<std::uint8_t>();
+  if (kind > 1) throw std::runtime_error("feature of unknown kind " + std::to_string(kind));
+  feature.kind = kind == 1 ? FeatureKind::kPoint : FeatureKind::kInverseDepth;
+  feature.offset = offset;
+  in->reals(feature.anchor_world);
+  in->reals(feature.bearing_world);
+  in->reals(feature.tangent_world);
+  feature.inverse_depth = in->real();
+  in->reals(feature.point_world);
+  return feature;
+}
+
+void write(const MapFeature& feature, Writer* out) {
+  out->integer(feature.id);
+  out->integer(feature.known);
+  out->integer(feature.attempts);
+  out->integer(feature.successes);
+  out->real(feature.recent_rate);
+  out->integer(feature.first_frame);
+  out->integer(feature.last_matched_frame);
+  const SourcePatch& patch = feature.patch;
+  out->reals(patch.pixel);
+  out->reals(patch.center);
+  out->reals(patch.T_world_camera.linear());
+  out->reals(patch.T_world_camera.translation());
+  out->integer(patch.image.rows);
+  for (int row = 0; row < patch.image.rows; ++row)
+    out->bytes(patch.image.ptr(row), patch.image.cols);
+}
+
+MapFeature readMapFeature(Reader* in) {
+  constexpr int kMaximumCount = std::numeric_limits<int>::max();
+  MapFeature feature;
+  feature.id = in->integer();
+  feature.known = in->flag();
+  feature.attempts = in->smallInteger("searches of a feature", 0, kMaximumCount);
+  feature.successes = in->smallInteger("matches of a feature", 0, feature.attempts);
+  feature.recent_rate = in->real();
+  feature.first_frame = in->integer();
+  feature.last_matched_frame = in->integer();
+  SourcePatch& patch = feature.patch;
+  in->reals(patch.pixel);
+  in->reals(patch.center);
+  Eigen::Matrix3d R;
+  Eigen::Vector3d t;
+  in->reals(R);
+  in->reals(t);
+  patch.T_world_camera.linear() = R;
+  patch.T_world_camera.translation() = t;
+  const int size = in->smallInteger("side of a patch", 1, kMaximumPatchSize);
+  const char* pixels = in->bytes(static_cast<std::size_t>(size) * size);
+  patch.image.create(size, size, CV_8UC1);
+  std::memcpy(patch.image.data, pixels, static_cast<std::size_t>(size) * size);
+  return feature;
+}
+
+void checkMapFeature(const MapFeature& feature, const MapFileContent& content) {
+  const std::string name = "feature " + std::to_string(feature.id);
+  const SourcePatch& patch = feature.patch;
+  if (patch.image.type() != CV_8UC1 || patch.image.rows != content.source_patch_size_px ||
+      patch.image.cols != content.source_patch_size_px)
+    throw std::invalid_argument(name +
+                                " has a patch of another size than image/source_patch_size_px");
+  const Eigen::Matrix3d R = patch.T_world_camera.linear();
+  if (!((R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 1e-6) ||
+      !(R.determinant() > 0.0))
+    throw std::invalid_argument(name + " was first seen from a pose that is not a rotation");
+  if (!patch.T_world_camera.translation().allFinite() || !patch.pixel.allFinite() ||
+      !(patch.center.minCoeff() >= 0.0) ||
+      !(patch.center.maxCoeff() <= content.source_patch_size_px - 1))
+    throw std::invalid_argument(name + " has a patch whose centre is out of range");
+  if (!(feature.recent_rate >= 0.0 && feature.recent_rate <= 1.0))
+    throw std::invalid_argument(name + " has a rate of matches outside [0, 1]");
+}
+
+void check(const MapFileContent& content) {
+  checkCalibration(content.camera);
+  ImageOptions image;
+  image.template_size_px = content.template_size_px;
+  image.source_patch_size_px = content.source_patch_size_px;
+  checkImageOptions(image);
+  if (content.source_patch_size_px > kMaximumPatchSize)
+    throw std::invalid_argument("image/source_patch_size_px is beyond what a map file holds");
+  Ekf(FilterOptions())
+      .restore(content.camera_state, content.features, content.covariance, content.next_id);
+  if (content.map.size() != content.features.size())
+    throw std::invalid_argument("map and filter hold different numbers of features");
+  for (std::size_t i = 0; i < content.map.size(); ++i) {
+    if (content.map[i].id != content.features[i].id)
+      throw std::invalid_argument("map and filter hold different features");
+    checkMapFeature(content.map[i], content);
+  }
+}
+
+MapFileContent readContent(Reader* in) {
+  MapFileContent content;
+  content.camera = readCamera(in);
+  content.template_size_px = in->smallInteger("template size", 1, kMaximumPatchSize);
+  content.source_patch_size_px = in->smallInteger("source patch size", 1, kMaximumPatchSize);
+  content.scale_source = in->smallInteger("scale source", 0, 255);
+  content.next_id = in->integer();
+  content.camera_state = readCameraState(in);
+  const auto count = static_cast<std::size_t>(in->integer(
+      "number of features", 0, static_cast<std::int64_t>(in->remaining() / kMinimumFeature)));
+  content.features.reserve(count);
+  content.map.reserve(count);
+  std::size_t size = CameraError::kSize;
+  for (std::size_t i = 0; i < count; ++i) {
+    content.features.push_back(readFeatureState(in, static_cast<int>(size)));
+    size += content.features.back().size();
+  }
+  for (std::size_t i = 0; i < count; ++i) content.map.push_back(readMapFeature(in));
+  // Nothing but the lower triangle is left; so its size is known before it is allocated.
+  if (in->remaining() != 8 * (size * (size + 1) / 2))
+    throw std::runtime_error("the covariance is not that of " + std::to_string(count) +
+                             " features");
+  content.covariance.resize(size, size);
+  for (std::size_t j = 0; j < size; ++j)
+    for (std::size_t i = j; i < size; ++i)
+      content.covariance(i, j) = content.covariance(j, i) = in->real();
+  return content;
+}
+
+std::uint32_t checksum(const char* data, std::size_t size) {
+  boost::crc_32_type crc;
+  crc.process_bytes(data, size);
+  return crc.checksum();
+}
+
+}  // namespace
+
+std::string serializeMap(const MapFileContent& content) {
+  check(content);
+  if (content.camera.name.size() > kMaximumName ||
+      content.camera.distortion.size() > kMaximumDistortion || content.scale_source < 0 ||
+      content.scale_source > 255)
+    throw std::invalid_argument("the camera's name or distortion or the scale source is too large");
+  Writer body;
+  write(content.camera, &body);
+  body.integer(content.template_size_px);
+  body.integer(content.source_patch_size_px);
+  body.integer(content.scale_source);
+  body.integer(content.next_id);
+  write(content.camera_state, &body);
+  body.integer(static_cast<std::int64_t>(content.features.size()));
+  for (const FeatureState& feature : content.features) write(feature, &body);
+  for (const MapFeature& feature : content.map) write(feature, &body);
+  for (Eigen::Index j = 0; j < content.covariance.cols(); ++j)
+    for (Eigen::Index i = j; i < content.covariance.rows(); ++i)
+      body.real(content.covariance(i, j));
+
+  Writer sized;
+  sized.number(static_cast<std::uint64_t>(body.content().size()));
+  sized.bytes(body.content().data(), body.content().size());
+  Writer file;
+  file.bytes(kMagic, 8);
+  file.number(kVersion);
+  file.number(checksum(sized.content().data(), sized.content().size()));
+  file.bytes(sized.content().data(), sized.content().size());
+  return file.content();
+}
+
+MapFileContent parseMap(const std::string& bytes) {
+  if (bytes.compare(0, 8, kMagic, 8) != 0) throw std::runtime_error("it is not a map file");
+  Reader in(bytes, 8);
+  const auto version = in.number<std::uint32_t>();
+  if (version == 0 || version > kVersion)
+    throw std::runtime_error("version " + std::to_string(version) +
+                             " of the format is not known here, only up to " +
+                             std::to_string(kVersion));
+  const auto expected_checksum = in.number<std::uint32_t>();
+  const auto size = in.number<std::uint64_t>();
+  if (size != in.remaining())
+    throw std::runtime_error("it holds " + std::to_string(bytes.size()) + " bytes instead of " +
+                             std::to_string(size) + " + " + std::to_string(kHeaderSize));
+  if (checksum(bytes.data() + 16, bytes.size() - 16) != expected_checksum)
+    throw std::runtime_error("it is damaged: the checksum does not match");
+  try {
+    MapFileContent content = readContent(&in);
+    check(content);
+    return content;
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(error.what());
+  }
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,233 @@
+#include "active_matching_slam/map/relocaliser.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "active_matching_slam/filter/rotation.h"
+#include "active_matching_slam/image/image_feature_search.h"
+#include "active_matching_slam/image/warp.h"
+#include "active_matching_slam/matching/search_ellipse.h"
+#include "orb_corners.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr double kMaximumDistance = 70.0;  ///< of descriptors [bit of 256]
+constexpr double kRatio = 0.9;             ///< best to second best distance (Lowe 2004)
+constexpr double kSamePlacePx = 6.0;  ///< nearer corners of other scales do not count as second
+constexpr int kMinimumSightings = 6;
+constexpr int kRansacIterations = 3000;
+constexpr float kRansacPx = 5.0f;
+constexpr double kLargestSlope = 5.0;  ///< of a ray: beyond it, ideal pixels run away
+
+void checkRange(const char* name, double value, double low, double high) {
+  if (!(value >= low && value <= high))
+    throw std::invalid_argument("relocaliser/" + std::string(name) + " = " + std::to_string(value) +
+                                " is outside [" + std::to_string(low) + ", " +
+                                std::to_string(high) + "]");
+}
+
+}  // namespace
+
+void checkRelocaliserOptions(const RelocaliserOptions& options) {
+  checkRange("minimum_inliers", options.minimum_inliers, 6, 1000);
+  checkRange("minimum_visible_share", options.minimum_visible_share, 0.2, 1.0);
+  checkRange("maximum_depth_sigma", options.maximum_depth_sigma, 0.0, 1.0);
+  checkRange("search_radius_px", options.search_radius_px, 1.0, 50.0);
+  checkRange("inlier_px", options.inlier_px, 0.5, 10.0);
+}
+
+Relocaliser::Relocaliser(const CameraModel& camera, const RelocaliserOptions& options,
+                         const MapOptions& map, const ImageOptions& image)
+    : camera_(camera), options_(options), map_options_(map), image_options_(image) {
+  checkRelocaliserOptions(options);
+  checkMapOptions(map);
+  checkImageOptions(image);
+}
+
+std::optional<Relocalisation> Relocaliser::find(const cv::Mat& image, const Ekf& filter,
+                                                const FeatureMap& map) const {
+  if (image.type() != CV_8UC1 || image.cols != camera_.width() || image.rows != camera_.height())
+    return std::nullopt;
+  const std::vector<Landmark> landmarks = usableLandmarks(filter, map);
+  if (static_cast<int>(landmarks.size()) < options_.minimum_inliers) return std::nullopt;
+  auto T_world_camera = solvePose(matchDescriptors(image, landmarks));
+  if (!T_world_camera) return std::nullopt;
+
+  std::vector<Sighting> found;
+  searchVisible(image, landmarks, *T_world_camera, options_.search_radius_px, &found);
+  if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
+  *T_world_camera = refinePose(found, *T_world_camera);
+
+  // The proof, with templates as the refined pose expects them.
+  Relocalisation result;
+  result.searched =
+      searchVisible(image, landmarks, *T_world_camera, 2.0 * options_.inlier_px, &found);
+  if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
+  result.T_world_camera = refinePose(found, *T_world_camera);
+  double sum = 0.0;
+  for (const Sighting& sighting : found) {
+    const double distance = residual(sighting, result.T_world_camera);
+    if (!(distance <= options_.inlier_px)) continue;
+    result.inliers.push_back({sighting.landmark->feature->id, sighting.pixel, 0.0});
+    sum += distance * distance;
+  }
+  const auto inliers = static_cast<double>(result.inliers.size());
+  if (inliers < options_.minimum_inliers ||
+      inliers < options_.minimum_visible_share * result.searched)
+    return std::nullopt;
+  result.rms_px = std::sqrt(sum / inliers);
+  return result;
+}
+
+std::vector<Relocaliser::Landmark> Relocaliser::usableLandmarks(const Ekf& filter,
+                                                                const FeatureMap& map) const {
+  std::vector<Landmark> landmarks;
+  for (const MapFeature& feature : map.features()) {
+    const FeatureState* state = filter.find(feature.id);
+    if (!state) continue;
+    if (state->kind == FeatureKind::kInverseDepth &&
+        !(filter.sigmaInverseDepth(*state) <= options_.maximum_depth_sigma * state->inverse_depth))
+      continue;
+    landmarks.push_back({&feature, state});
+  }
+  return landmarks;
+}
+
+std::vector<Relocaliser::Sighting> Relocaliser::matchDescriptors(
+    const cv::Mat& image, const std::vector<Landmark>& landmarks) const {
+  const DescribedPoints points = describeCorners(image);
+  std::vector<Sighting> sightings;
+  std::vector<double> distances(points.pixels.size());
+  for (const Landmark& landmark : landmarks) {
+    const SourcePatch& patch = landmark.feature->patch;
+    const cv::Mat descriptor = describePoint(patch.image, patch.center);
+    if (descriptor.empty() || distances.empty()) continue;
+    std::size_t best = 0;
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      distances[i] =
+          cv::norm(descriptor, points.descriptors.row(static_cast<int>(i)), cv::NORM_HAMMING);
+      if (distances[i] < distances[best]) best = i;
+    }
+    double second = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < distances.size(); ++i)
+      if ((points.pixels[i] - points.pixels[best]).norm() > kSamePlacePx)
+        second = std::min(second, distances[i]);
+    if (distances[best] <= kMaximumDistance && distances[best] < kRatio * second)
+      sightings.push_back({&landmark, points.pixels[best]});
+  }
+  return sightings;
+}
+
+std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
+    const std::vector<Sighting>& sightings) const {
+  // Ideal pixels: those of a lens without distortion and square pixels.
+  const double focal = 0.5 * (camera_.calibration().fx + camera_.calibration().fy);
+  std::vector<cv::Point3d> points;
+  std::vector<cv::Point2d> ideal;
+  for (const Sighting& sighting : sightings) {
+    const auto ray = camera_.unproject(sighting.pixel);
+    const Eigen::Vector3d position = sighting.landmark->state->position();
+    if (!ray || !position.allFinite() || !(ray->head<2>().norm() < kLargestSlope * ray->z()))
+      continue;
+    points.emplace_back(position.x(), position.y(), position.z());
+    ideal.emplace_back(focal * ray->x() / ray->z(), focal * ray->y() / ray->z());
+  }
+  if (static_cast<int>(points.size()) < kMinimumSightings) return std::nullopt;
+  const cv::Matx33d K(focal, 0.0, 0.0, 0.0, focal, 0.0, 0.0, 0.0, 1.0);
+  cv::Vec3d rotation, translation;
+  std::vector<int> inliers;
+  try {  // its random numbers start from a fixed seed at every call
+    if (!cv::solvePnPRansac(points, ideal, K, cv::noArray(), rotation, translation, false,
+                            kRansacIterations, kRansacPx, 0.999, inliers, cv::SOLVEPNP_P3P))
+      return std::nullopt;
+  } catch (const cv::Exception&) {  // degenerate points
+    return std::nullopt;
+  }
+  if (static_cast<int>(inliers.size()) < kMinimumSightings) return std::nullopt;
+  Eigen::Isometry3d T_camera_world = Eigen::Isometry3d::Identity();
+  T_camera_world.linear() =
+      rotationFromVector(Eigen::Vector3d(rotation[0], rotation[1], rotation[2])).toRotationMatrix();
+  T_camera_world.translation() << translation[0], translation[1], translation[2];
+  if (!T_camera_world.matrix().allFinite()) return std::nullopt;
+  return T_camera_world.inverse();
+}
+
+int Relocaliser::searchVisible(const cv::Mat& image, const std::vector<Landmark>& landmarks,
+                               const Eigen::Isometry3d& T_world_camera, double radius_px,
+                               std::vector<Sighting>* found) const {
+  const double maximum_angle = map_options_.maximum_view_angle_deg * M_PI / 180.0;
+  std::vector<const Landmark*> visible;
+  std::vector<Template> templates;
+  std::vector<SearchEllipse> ellipses;
+  for (const Landmark& landmark : landmarks) {
+    const auto view = predictPatchView(landmark.feature->patch, camera_, T_world_camera,
+                                       homogeneousPosition(*landmark.state));
+    Template expected;
+    if (!view || !camera_.isInImage(view->pixel, image_options_.border_px) ||
+        view->view_angle_rad > maximum_angle || view->scale < map_options_.minimum_scale ||
+        view->scale > map_options_.maximum_scale ||
+        !warpTemplate(landmark.feature->patch, *view, image_options_.template_size_px, &expected) ||
+        expected.contrast() < image_options_.minimum_contrast)
+      continue;
+    visible.push_back(&landmark);
+    templates.push_back(expected);
+    const double sigma = radius_px / std::sqrt(kEllipseRadius2);
+    ellipses.push_back({view->pixel, sigma * sigma * Eigen::Matrix2d::Identity()});
+  }
+  ImageFeatureSearch search(image_options_);
+  search.beginFrame(image, templates);
+  found->clear();
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    search.search(static_cast<int>(i), ellipses[i]);
+    if (const SearchMatch* match = search.bestMatch(static_cast<int>(i)))
+      found->push_back({visible[i], match->pixel});
+  }
+  return static_cast<int>(visible.size());
+}
+
+Eigen::Isometry3d Relocaliser::refinePose(const std::vector<Sighting>& sightings,
+                                          Eigen::Isometry3d T_world_camera) const {
+  constexpr int kIterations = 10;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
+    const Eigen::Matrix3d R_camera_world = T_world_camera.linear().transpose();
+    for (const Sighting& sighting : sightings) {
+      Eigen::Matrix<double, 2, 3> d_pixel_d_point;
+      const Eigen::Vector3d point =
+          R_camera_world * (sighting.landmark->state->position() - T_world_camera.translation());
+      const auto pixel = camera_.project(point, &d_pixel_d_point);
+      if (!pixel) continue;
+      // The pose gains (dt, dr) in the camera's frame: the point moves by -dt + [point]x dr.
+      Eigen::Matrix<double, 3, 6> d_point;
+      d_point << -Eigen::Matrix3d::Identity(), skew(point);
+      const Eigen::Matrix<double, 2, 6> J = d_pixel_d_point * d_point;
+      const Eigen::Vector2d error = sighting.pixel - *pixel;
+      const double weight = 1.0 / (1.0 + error.squaredNorm());  // Cauchy's, of a pixel
+      A += weight * J.transpose() * J;
+      b += weight * J.transpose() * error;
+    }
+    const Eigen::Matrix<double, 6, 1> step = A.ldlt().solve(b);
+    if (!step.allFinite()) return T_world_camera;
+    T_world_camera.translation() += T_world_camera.linear() * step.head<3>();
+    T_world_camera.linear() = (T_world_camera.linear() * rotationFromVector(step.tail<3>())).eval();
+  }
+  T_world_camera.linear() = Eigen::Quaterniond(T_world_camera.linear()).normalized().matrix();
+  return T_world_camera;
+}
+
+double Relocaliser::residual(const Sighting& sighting,
+                             const Eigen::Isometry3d& T_world_camera) const {
+  const Eigen::Vector3d point =
+      T_world_camera.linear().transpose() *
+      (sighting.landmark->state->position() - T_world_camera.translation());
+  const auto pixel = camera_.project(point);
+  return pixel ? (*pixel - sighting.pixel).norm() : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace active_matching_slam

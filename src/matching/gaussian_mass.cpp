@@ -1,0 +1,385 @@
+#include "gaussian_mass.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "active_matching_slam/matching/search_ellipse.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Beyond this many sigma from the mean lies less than 5e-8 of a Gaussian in the plane.
+constexpr double kNothingBeyond = 5.8;
+constexpr double kRadius = 3.0;  // of a search ellipse, in sigma
+/// Nodes of the trapezoidal rule for the error of 1e-7, found by trial over all shapes.
+constexpr double kNodesBase = 6.0, kNodesFactor = 3.6;
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/// Multiplies by the inverse of the lower Cholesky factor of a covariance.
+class Whitener {
+ public:
+  explicit Whitener(const Eigen::Matrix2d& c)
+      : l00_(std::sqrt(c(0, 0))), l10_(c(0, 1) / l00_), l11_(std::sqrt(c(1, 1) - l10_ * l10_)) {}
+  Eigen::Vector2d operator()(const Eigen::Vector2d& p) const {
+    const double x = p.x() / l00_;
+    return {x, (p.y() - l10_ * x) / l11_};
+  }
+  Eigen::Vector2d column0() const { return {l00_, l10_}; }
+  Eigen::Vector2d column1() const { return {0.0, l11_}; }
+
+ private:
+  double l00_, l10_, l11_;
+};
+
+/// (1 - exp(-q/2)) / q
+double kernel(double q) { return q < 1e-6 ? 0.5 - 0.125 * q : -std::expm1(-0.5 * q) / q; }
+
+/// Cosines and sines of equal steps round the circle, for each number of nodes in use.
+struct Circle {
+  int nodes;
+  std::vector<double> cosine, sine;
+};
+constexpr int kMostNodes = 768;
+
+/// The circle of the fewest nodes not below `wanted`, a multiple of 8.
+const Circle& circleOf(double wanted) {
+  static const std::vector<Circle> circles = [] {
+    std::vector<Circle> all;
+    for (const int n : {8, 16, 24, 32, 40, 48, 64, 80, 96, 128, 192, 256, 384, kMostNodes}) {
+      Circle circle{n, {}, {}};
+      for (int i = 0; i < n; ++i) {
+        circle.cosine.push_back(std::cos(2.0 * M_PI * i / n));
+        circle.sine.push_back(std::sin(2.0 * M_PI * i / n));
+      }
+      all.push_back(std::move(circle));
+    }
+    return all;
+  }();
+  for (const Circle& circle : circles)
+    if (circle.nodes >= wanted) return circle;
+  return circles.back();
+}
+
+/// |y|^2 = q0 + qc cos t + qs sin t + qc2 cos 2t + qs2 sin 2t and y x dy = (j0 + jc cos t + js sin
+/// t) dt along an ellipse.
+struct ContourIntegrand {
+  double q0, qc, qs, qc2, qs2, j0, jc, js;
+};
+
+/// Sum over the nodes of kernel(|y|^2) * (y x dy / dt), to 1e-10 relative. Compiled for several
+/// instruction sets; without contraction, and with eight partial sums, all give the same bits.
+#if defined(__GNUC__) && !defined(__clang__)
+__attribute__((optimize("no-trapping-math",
+                        "fp-contract=off")))  // or the choice of the series keeps it scalar
+#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
+__attribute__((target_clones("avx512f", "avx2", "default")))
+#endif
+#endif
+double
+sumOverNodes(const ContourIntegrand& f, const double* cosine, const double* sine, int nodes) {
+  constexpr double kLog2E = 1.4426950408889634, kShift = 6755399441055744.0;  // 1.5 * 2^52
+  constexpr double kLn2High = 6.93147180369123816490e-01, kLn2Low = 1.90821492927058770002e-10;
+  double value[kMostNodes];
+  for (int i = 0; i < nodes; ++i) {
+    const double c = cosine[i], s = sine[i];
+    const double q = f.q0 + f.qc * c + f.qs * s + f.qc2 * (c * c - s * s) + 2.0 * f.qs2 * c * s;
+    // exp(x) = 2^k exp(r), |r| <= ln(2) / 2
+    const double half = -0.5 * q, x = half > -700.0 ? half : -700.0;
+    const double shifted = x * kLog2E + kShift, k = shifted - kShift;
+    const double r = (x - k * kLn2High) - k * kLn2Low;
+    double p = 1.0 / 3628800;
+    p = p * r + 1.0 / 362880;
+    p = p * r + 1.0 / 40320;
+    p = p * r + 1.0 / 5040;
+    p = p * r + 1.0 / 720;
+    p = p * r + 1.0 / 120;
+    p = p * r + 1.0 / 24;
+    p = p * r + 1.0 / 6;
+    p = p * r + 0.5;
+    p = p * r + 1.0;
+    p = p * r + 1.0;
+    std::uint64_t bits;
+    std::memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits << 52) + 0x3FF0000000000000u;
+    double power;
+    std::memcpy(&power, &bits, sizeof power);
+    const double series = 0.5 - q * (0.125 - q * (1.0 / 48.0 - q * (1.0 / 384.0)));
+    const double quotient = (1.0 - p * power) / q;
+    const double kernel = q < 0.02 ? series : quotient;
+    value[i] = (f.j0 + f.jc * c + f.js * s) * kernel;
+  }
+  double partial[8] = {};
+  for (int i = 0; i < nodes; i += 8)
+    for (int j = 0; j < 8; ++j) partial[j] += value[i + j];
+  return ((partial[0] + partial[4]) + (partial[2] + partial[6])) +
+         ((partial[1] + partial[5]) + (partial[3] + partial[7]));
+}
+
+/// The ellipse in whitened coordinates, d + b0 cos t + b1 sin t.
+struct WhitenedEllipse {
+  Eigen::Vector2d d, b0, b1;
+  double long_axis, short_axis;
+
+  WhitenedEllipse(const Eigen::Vector2d& offset, const Eigen::Vector2d& axis0,
+                  const Eigen::Vector2d& axis1)
+      : d(offset), b0(axis0), b1(axis1) {
+    const double sum = b0.squaredNorm() + b1.squaredNorm(), area = cross(b0, b1);
+    const double root = std::sqrt(std::max(sum * sum - 4.0 * area * area, 0.0));
+    long_axis = std::sqrt(0.5 * (sum + root));
+    short_axis = area / long_axis;
+  }
+  /// 0 or 1 where the mass is that to 5e-8, else -1.
+  double obviousMass() const {
+    const double distance2 = d.squaredNorm(), reach = long_axis + kNothingBeyond;
+    if (distance2 > reach * reach) return 0.0;
+    // The mean in units of the ellipse's own radius.
+    const double area = cross(b0, b1);
+    const double x = cross(d, b1), y = cross(b0, d);
+    const double r = std::sqrt(x * x + y * y) / area;
+    if (short_axis * (r - 1.0) > kNothingBeyond) return 0.0;
+    if (short_axis * (1.0 - r) > kNothingBeyond) return 1.0;
+    return -1.0;
+  }
+};
+
+constexpr int kLegendre = 8;
+constexpr std::array<double, kLegendre / 2> kLegendreNode = {
+    0.18343464249564980, 0.52553240991632899, 0.79666647741362674, 0.96028985649753623};
+constexpr std::array<double, kLegendre / 2> kLegendreWeight = {
+    0.36268378337836198, 0.31370664587788729, 0.22238103445337447, 0.10122853629037626};
+
+/// Integral of f over [t0, t1] in `pieces` parts.
+template <typename F>
+double integrate(double t0, double t1, int pieces, F f) {
+  const double half = 0.5 * (t1 - t0) / pieces;
+  double sum = 0.0;
+  for (int p = 0; p < pieces; ++p) {
+    const double middle = t0 + (2 * p + 1) * half;
+    for (std::size_t i = 0; i < kLegendreNode.size(); ++i)
+      sum += kLegendreWeight[i] *
+             (f(middle - half * kLegendreNode[i]) + f(middle + half * kLegendreNode[i]));
+  }
+  return sum * half;
+}
+
+/// Beyond this many sigma a sum over pixels has nothing left to find.
+constexpr double kFarthest = 6.5;
+
+/// Whether a sigma along any direction is below 0.4 px.
+bool isNarrow(const Eigen::Matrix2d& c) {
+  constexpr double kNarrow2 = 0.16;
+  const double trace = c(0, 0) + c(1, 1), det = c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1);
+  return trace < 2.0 * kNarrow2 || det - kNarrow2 * trace + kNarrow2 * kNarrow2 < 0.0;
+}
+
+/// Integral over the unit square around m: rows by quadrature, along a row by the error function.
+double massOfNarrowPixel(const Eigen::Vector2d& m, const Eigen::Vector2d& mean,
+                         const Eigen::Matrix2d& c) {
+  const double sigma_v = std::sqrt(c(1, 1)), tilt = c(0, 1) / c(1, 1);
+  const double scale = 1.0 / std::sqrt(2.0 * (c(0, 0) - tilt * c(0, 1)));
+  const double low = std::max(m.y() - 0.5, mean.y() - kFarthest * sigma_v);
+  const double high = std::min(m.y() + 0.5, mean.y() + kFarthest * sigma_v);
+  if (!(low < high)) return 0.0;
+  // Steps fine enough for the row's Gaussian and for the slant of a thin ridge.
+  const double finest = std::min(sigma_v, 1.0 / (1e-3 + scale * std::abs(tilt)));
+  const int pieces = static_cast<int>(std::clamp((high - low) / finest + 1.0, 1.0, 64.0));
+  const double sum = integrate(low, high, pieces, [&](double v) {
+    const double d = (v - mean.y()) / sigma_v, u = m.x() - mean.x() - tilt * (v - mean.y());
+    return std::exp(-0.5 * d * d) * (std::erf((u + 0.5) * scale) - std::erf((u - 0.5) * scale));
+  });
+  return 0.5 * sum / (sigma_v * std::sqrt(2.0 * M_PI));
+}
+
+double massOnNarrowPixels(const PixelMask& mask, const Eigen::Vector2d& mean,
+                          const Eigen::Matrix2d& c) {
+  const double reach_u = kFarthest * std::sqrt(c(0, 0)) + 0.5;
+  const double reach_v = kFarthest * std::sqrt(c(1, 1)) + 0.5;
+  double sum = 0.0;
+  mask.forEachRun([&](const PixelRun& run) {
+    if (std::abs(run.v - mean.y()) > reach_v) return;
+    const double first = std::max<double>(run.begin_u, std::ceil(mean.x() - reach_u));
+    const double last = std::min<double>(run.end_u - 1, std::floor(mean.x() + reach_u));
+    for (double u = first; u <= last; u += 1.0) sum += massOfNarrowPixel({u, run.v}, mean, c);
+  });
+  return sum;
+}
+
+}  // namespace
+
+double massInEllipse(const SearchEllipse& ellipse, const Eigen::Vector2d& mean,
+                     const Eigen::Matrix2d& covariance) {
+  const Whitener of_ellipse(ellipse.covariance), whiten(covariance);
+  const WhitenedEllipse e(whiten(ellipse.center - mean), kRadius * whiten(of_ellipse.column0()),
+                          kRadius * whiten(of_ellipse.column1()));
+  const double obvious = e.obviousMass();
+  if (obvious >= 0.0) return obvious;
+  ContourIntegrand f;
+  f.q0 = e.d.squaredNorm() + 0.5 * (e.b0.squaredNorm() + e.b1.squaredNorm());
+  f.qc = 2.0 * e.d.dot(e.b0);
+  f.qs = 2.0 * e.d.dot(e.b1);
+  f.qc2 = 0.5 * (e.b0.squaredNorm() - e.b1.squaredNorm());
+  f.qs2 = e.b0.dot(e.b1);
+  f.j0 = cross(e.b0, e.b1);
+  f.jc = cross(e.d, e.b1);
+  f.js = -cross(e.d, e.b0);
+  // The Fourier coefficients of the integrand fall off like those of exp(-|y|^2 / 2).
+  const double swing =
+      std::sqrt(f.qc * f.qc + f.qs * f.qs) + 4.0 * std::sqrt(f.qc2 * f.qc2 + f.qs2 * f.qs2);
+  const Circle& circle = circleOf(kNodesBase + kNodesFactor * std::sqrt(swing));
+  const double sum = sumOverNodes(f, circle.cosine.data(), circle.sine.data(), circle.nodes);
+  return std::clamp(sum / circle.nodes, 0.0, 1.0);
+}
+
+ClippedEllipse::ClippedEllipse(const SearchEllipse& ellipse, const PixelBox& box)
+    : center_(ellipse.center) {
+  const Whitener of_ellipse(ellipse.covariance);
+  axis0_ = kRadius * of_ellipse.column0();
+  axis1_ = kRadius * of_ellipse.column1();
+  const double low[2] = {box.min_u - 0.5, box.min_v - 0.5};
+  const double high[2] = {box.max_u + 0.5, box.max_v + 0.5};
+  std::vector<double> crossings;
+  // Part of each side inside the ellipse, and where the ellipse crosses the side's line.
+  for (int axis = 0; axis < 2; ++axis) {
+    const double amplitude = std::hypot(axis0_(axis), axis1_(axis));
+    const double phase = std::atan2(axis1_(axis), axis0_(axis));
+    for (const bool upper : {false, true}) {
+      const double side = upper ? high[axis] : low[axis];
+      const double ratio = (side - center_(axis)) / amplitude;
+      if (!(std::abs(ratio) < 1.0)) continue;
+      const double swing = std::acos(ratio);
+      double ends[2];
+      for (const int k : {0, 1}) {
+        const double t = phase + (k == 0 ? -swing : swing);
+        crossings.push_back(t - 2.0 * M_PI * std::floor(t / (2.0 * M_PI)));
+        ends[k] =
+            center_(1 - axis) + axis0_(1 - axis) * std::cos(t) + axis1_(1 - axis) * std::sin(t);
+      }
+      const double begin = std::max(std::min(ends[0], ends[1]), low[1 - axis]);
+      const double end = std::min(std::max(ends[0], ends[1]), high[1 - axis]);
+      if (!(begin < end)) continue;
+      Eigen::Vector2d a, b;
+      a(axis) = b(axis) = side;
+      a(1 - axis) = begin;
+      b(1 - axis) = end;
+      // Counter-clockwise: right side and low row forwards, left side and high row backwards.
+      if ((axis == 0) != upper) std::swap(a, b);
+      segments_.emplace_back(a, b);
+    }
+  }
+  std::sort(crossings.begin(), crossings.end());
+  if (crossings.empty()) crossings.push_back(0.0);
+  for (std::size_t i = 0; i < crossings.size(); ++i) {
+    const double t0 = crossings[i];
+    const double t1 = i + 1 < crossings.size() ? crossings[i + 1] : crossings[0] + 2.0 * M_PI;
+    const double t = 0.5 * (t0 + t1);
+    const Eigen::Vector2d p = center_ + axis0_ * std::cos(t) + axis1_ * std::sin(t);
+    if (t1 > t0 && p.x() > low[0] && p.x() < high[0] && p.y() > low[1] && p.y() < high[1])
+      arcs_.emplace_back(t0, t1);
+  }
+}
+
+double ClippedEllipse::area() const {
+  double twice = 0.0;
+  for (const auto& [t0, t1] : arcs_) twice += cross(axis0_, axis1_) * (t1 - t0);
+  for (const auto& [a, b] : segments_) twice += cross(a - center_, b - center_);
+  return std::max(0.5 * twice, 0.0);
+}
+
+double ClippedEllipse::mass(const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance) const {
+  if (arcs_.empty() && segments_.empty()) return 0.0;
+  const Whitener whiten(covariance);
+  const WhitenedEllipse e(whiten(center_ - mean), whiten(axis0_), whiten(axis1_));
+  if (e.obviousMass() == 0.0) return 0.0;
+  constexpr double kPiece = 2.0;  // sigma
+  constexpr int kMostPieces = 400;
+  double sum = 0.0;
+  for (const auto& [t0, t1] : arcs_) {
+    const double pieces = std::ceil((t1 - t0) * std::max(e.long_axis / kPiece, 1.25));
+    sum +=
+        integrate(t0, t1, static_cast<int>(std::min<double>(pieces, kMostPieces)), [&](double t) {
+          const double c = std::cos(t), s = std::sin(t);
+          const Eigen::Vector2d y = e.d + e.b0 * c + e.b1 * s;
+          return cross(y, e.b1 * c - e.b0 * s) * kernel(y.squaredNorm());
+        });
+  }
+  for (const auto& [a, b] : segments_) {
+    const Eigen::Vector2d y0 = whiten(a - mean), step = whiten(b - a);
+    const double pieces = std::max(std::ceil(step.norm() / kPiece), 1.0);
+    sum +=
+        integrate(0.0, 1.0, static_cast<int>(std::min<double>(pieces, kMostPieces)), [&](double t) {
+          const Eigen::Vector2d y = y0 + t * step;
+          return cross(y, step) * kernel(y.squaredNorm());
+        });
+  }
+  return std::clamp(sum / (2.0 * M_PI), 0.0, 1.0);
+}
+
+double massOfPixel(const Eigen::Vector2d& m, const Eigen::Vector2d& mean,
+                   const Eigen::Matrix2d& covariance) {
+  if (isNarrow(covariance)) return massOfNarrowPixel(m, mean, covariance);
+  const double det = covariance(0, 0) * covariance(1, 1) - covariance(0, 1) * covariance(0, 1);
+  return std::exp(-0.5 * mahalanobisSquared({mean, covariance}, m)) / (2.0 * M_PI * std::sqrt(det));
+}
+
+double massOnPixels(const PixelMask& mask, const Eigen::Vector2d& mean,
+                    const Eigen::Matrix2d& covariance) {
+  if (isNarrow(covariance)) return massOnNarrowPixels(mask, mean, covariance);
+  constexpr double kReach2 = kFarthest * kFarthest;
+  const double xy = covariance(0, 1), yy = covariance(1, 1);
+  const double det = covariance(0, 0) * yy - xy * xy;
+  // Row by row: density(u, v) = row(v) * exp(-(u - middle)^2 / (2 variance)).
+  const double variance = det / yy, sigma = std::sqrt(variance), tilt = xy / yy;
+  const double scale = 1.0 / (2.0 * M_PI * std::sqrt(det)), half_over_variance = 0.5 / variance;
+  const double step4 = std::exp(-32.0 * half_over_variance);
+  double sum = 0.0;
+  mask.forEachRun([&](const PixelRun& run) {
+    const double dv = run.v - mean.y(), dv2 = dv * dv / yy;
+    if (dv2 >= kReach2) return;
+    const double middle = mean.x() + tilt * dv, half = sigma * std::sqrt(kReach2 - dv2);
+    const double first = std::ceil(middle - half), last = std::floor(middle + half);
+    if (last < run.begin_u || first > run.end_u - 1) return;
+    const double row = std::exp(-0.5 * dv2);
+    // A sum over all integers is the integral, to 2 exp(-2 pi^2 variance).
+    if (variance >= 1.0 && first > run.begin_u && last < run.end_u - 1) {
+      sum += row * sigma * std::sqrt(2.0 * M_PI);
+      return;
+    }
+    const int begin = std::max(run.begin_u, static_cast<int>(first));
+    const int end = std::min(run.end_u, static_cast<int>(last) + 1);
+    // Four interleaved recurrences e(u + 4) = e(u) r(u), r(u + 4) = r(u) step4.
+    double e[4], r[4], partial[4] = {0.0, 0.0, 0.0, 0.0};
+    const double x = begin - middle;
+    double ratio = std::exp(-(2.0 * x + 1.0) * half_over_variance);
+    double ratio4 = std::exp(-(8.0 * x + 16.0) * half_over_variance);
+    const double ratio_step = std::exp(-2.0 * half_over_variance);
+    const double ratio4_step = std::exp(-8.0 * half_over_variance);
+    e[0] = std::exp(-x * x * half_over_variance);
+    r[0] = ratio4;
+    for (int i = 1; i < 4; ++i) {
+      e[i] = e[i - 1] * ratio;
+      ratio *= ratio_step;
+      ratio4 *= ratio4_step;
+      r[i] = ratio4;
+    }
+    int u = begin;
+    for (; u + 4 <= end; u += 4) {
+      for (int i = 0; i < 4; ++i) {
+        partial[i] += e[i];
+        e[i] *= r[i];
+        r[i] *= step4;
+      }
+    }
+    double total = partial[0] + partial[1] + partial[2] + partial[3];
+    for (int i = 0; u < end; ++u, ++i) total += e[i];
+    sum += row * total;
+  });
+  return scale * sum;
+}
+
+}  // namespace active_matching_slam

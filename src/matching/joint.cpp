@@ -1,0 +1,42 @@
+#include "joint.h"
+
+#include <Eigen/LU>
+
+#include "active_matching_slam/information/gaussian_information.h"
+#include "active_matching_slam/matching/search_ellipse.h"
+
+namespace active_matching_slam {
+
+Joint::Joint(const Eigen::Matrix2d& noise, Eigen::VectorXd precision_determinant)
+    : noise_(noise), precision_determinant_(std::move(precision_determinant)) {}
+
+std::shared_ptr<const Conditional> Joint::measure(const std::shared_ptr<const Conditional>& given,
+                                                  int feature) const {
+  for (const auto& [measured, known] : given->derived_)
+    if (measured == feature)
+      if (auto alive = known.lock()) return alive;
+  std::shared_ptr<Conditional> derived = derive(given, feature);
+  derived->measured_precision_ = given->marginal(feature).covariance.inverse();
+  given->derived_.emplace_back(feature, derived);
+  return derived;
+}
+
+void Joint::setMarginal(Conditional& conditional, int feature,
+                        const Eigen::Matrix2d& covariance) const {
+  Marginal& marginal = conditional.marginals_[static_cast<std::size_t>(feature)];
+  marginal.covariance = covariance;
+  const bool proper = isProperCovariance(covariance);
+  marginal.determinant = proper ? covariance.determinant() : 0.0;
+  marginal.information_bits =
+      proper ? informationBits(marginal.determinant, precision_determinant_(feature)) : 0.0;
+}
+
+void Joint::inherit(Conditional& conditional, const Conditional& given, int feature) const {
+  const auto slot = static_cast<std::size_t>(feature);
+  conditional.marginals_ = given.marginals_;
+  conditional.measured_ = given.measured_;
+  conditional.measured_[slot] = 1;
+  conditional.marginals_[slot] = {noise_, noise_.determinant(), 0.0};
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "mixture.h"
+
+namespace active_matching_slam {
+
+/// What a search is expected to bring. (Chli 2009, eq. 5.11-5.18)
+struct ExpectedInformation {
+  double discrete_bits = 0.0;    ///< about which Gaussian is true; may be negative
+  double continuous_bits = 0.0;  ///< about where the other features are
+  double null_probability = 0.0;
+  double score = 0.0;  ///< bits per pixel of the ellipse
+  double bits() const { return discrete_bits + continuous_bits; }
+};
+
+/// A search that could be made next: a candidate of a hypothesis (indices).
+struct Measurement {
+  int hypothesis = -1;
+  int candidate = -1;
+  ExpectedInformation expected;
+  bool exists() const { return candidate >= 0; }
+};
+
+/// Chooses the next search of a mixture.
+class MeasurementChoice {
+ public:
+  MeasurementChoice(Mixture& mixture, bool skip_sterile)
+      : mixture_(mixture), skip_sterile_(skip_sterile) {}
+
+  /// The candidate of the highest score; ties: the lower Gaussian, then the lower feature.
+  /// Candidates whose bound, (H(lambda) + most continuous information) / area, is below the best
+  /// are skipped.
+  Measurement best();
+  /// The best of `count` candidates drawn at random, evenly spread over the Gaussians; `most_bits`:
+  /// the largest expected information among them.
+  Measurement bestOfDrawn(int count, std::mt19937_64& random, double& most_bits);
+  /// The lowest candidate of one hypothesis, without any evaluation.
+  Measurement firstOf(int hypothesis);
+
+  ExpectedInformation evaluate(int g, int c);
+
+ private:
+  bool isCandidate(int g, int c) {
+    return mixture_.hypotheses()[static_cast<std::size_t>(g)]
+               .candidates[static_cast<std::size_t>(c)]
+               .open &&
+           !(skip_sterile_ && mixture_.isSterile(g, c));
+  }
+  void updateEntropy();
+  double bound(const Hypothesis& h, const Hypothesis::Candidate& gate) const;
+  ExpectedInformation takeIfBetter(int g, int c, Measurement& best);
+
+  Mixture& mixture_;
+  bool skip_sterile_;
+  double entropy_ = 0.0;             // H(lambda) [bits]
+  std::vector<double> log_weights_;  // ln(lambda)
+  struct Bounded {
+    double bound;
+    int hypothesis, candidate;
+  };
+  std::vector<Bounded> bounds_;
+};
+
+}  // namespace active_matching_slam

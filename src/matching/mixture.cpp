@@ -1,0 +1,246 @@
+#include "mixture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "active_matching_slam/information/gaussian_information.h"
+#include "active_matching_slam/matching/search_ellipse.h"
+#include "gaussian_mass.h"
+
+namespace active_matching_slam {
+namespace {
+
+std::size_t slot(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
+                 std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
+    : joint_(joint), ledger_(ledger), options_(options), likelihoods_(std::move(likelihoods)) {
+  Hypothesis root;
+  const std::size_t size = slot(joint.size());
+  root.joint = joint.prior();
+  root.mean.resize(size);
+  root.match.assign(size, -1);
+  root.lineage.assign(size, -1);
+  root.candidate_of.assign(size, -1);
+  for (int f = 0; f < joint.size(); ++f) {
+    valid_.push_back(ledger.validArea(f));
+    root.mean[slot(f)] = prior.mean(f);
+    addCandidate(root, f);
+  }
+  root.slot = pairs_.acquire();
+  hypotheses_.push_back(std::move(root));
+}
+
+int Mixture::heaviest() const {
+  int best = 0;
+  for (int k = 1; k < static_cast<int>(hypotheses_.size()); ++k)
+    if (hypotheses_[slot(k)].weight > hypotheses_[slot(best)].weight) best = k;
+  return best;
+}
+
+double Mixture::mass(int k, int c, int g) {
+  const Hypothesis& of = hypotheses_[slot(k)];
+  const Hypothesis& in = hypotheses_[slot(g)];
+  const Hypothesis::Candidate& candidate = in.candidates[slot(c)];
+  if (k == g) return candidate.mass;
+  const bool remembered = of.slot >= 0 && in.slot >= 0;
+  if (remembered) {
+    PairTable::Row& row = pairs_.row(of.slot, in.slot);
+    if (row.empty()) row.resize(in.candidates.size());
+    if (row[slot(c)].mass != PairTerm::kUnknown) return row[slot(c)].mass;
+  }
+  const int f = candidate.feature;
+  double mass = 0.0;
+  if (of.joint->marginal(f).determinant > 0.0) {
+    mass = candidate.clipped ? ClippedEllipse(in.ellipse(f), valid_[slot(f)])
+                                   .mass(of.mean[slot(f)], of.covariance(f))
+                             : massInEllipse(in.ellipse(f), of.mean[slot(f)], of.covariance(f));
+  }
+  if (remembered) pairs_.row(of.slot, in.slot)[slot(c)].mass = mass;
+  return mass;
+}
+
+const PairTerm& Mixture::term(int k, int c, int g) {
+  const Hypothesis& of = hypotheses_[slot(k)];
+  const Hypothesis& in = hypotheses_[slot(g)];
+  PairTerm* known = &scratch_;
+  if (of.slot >= 0 && in.slot >= 0) {
+    PairTable::Row& row = pairs_.row(of.slot, in.slot);
+    if (row.empty()) row.resize(in.candidates.size());
+    known = &row[slot(c)];
+    if (known->null != PairTerm::kUnknown) return *known;
+  }
+  const Hypothesis::Candidate& candidate = in.candidates[slot(c)];
+  const SearchLikelihood& likelihood = this->likelihood(candidate.feature);
+  const auto timesLog = [](double x) { return x > 0.0 ? x * std::log(x) : 0.0; };
+  const double a = mass(k, c, g);
+  known->mass = a;
+  known->null = likelihood.in * a + 1.0 - a;
+  // A sliver of an ellipse, clipped to less than a pixel, has no room for a second match.
+  known->match =
+      std::max((k == g ? 0.0 : likelihood.match * a) + likelihood.in * (candidate.area - 1.0) * a +
+                   candidate.area * (1.0 - a),
+               0.0);
+  known->null_log = timesLog(known->null);
+  known->match_log = timesLog(known->match);
+  return *known;
+}
+
+bool Mixture::liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const {
+  for (int i = h.lineage[slot(f)]; i >= 0; i = searched_[slot(i)].next)
+    if (mahalanobisSquared(searched_[slot(i)].ellipse, p) <= kEllipseRadius2) return true;
+  return false;
+}
+
+bool Mixture::isSterile(int g, int c) {
+  constexpr double kSurelyHoldsAPixel = 30.0;  // px^2
+  Hypothesis& h = hypotheses_[slot(g)];
+  Hypothesis::Candidate& candidate = h.candidates[slot(c)];
+  const int f = candidate.feature;
+  const std::int64_t pixels = ledger_.searchedPixels(f).size();
+  const std::vector<SearchMatch>& known = ledger_.matches(f);
+  if (pixels == 0 && candidate.area > kSurelyHoldsAPixel && !candidate.clipped) return false;
+  // Both only grow, so their sum tells whether anything has changed since the last look.
+  const std::int64_t state = 2 * (pixels + static_cast<std::int64_t>(known.size()));
+  if (candidate.checked >= 0 && candidate.checked / 2 == state / 2)
+    return candidate.checked % 2 == 1;
+  const SearchEllipse ellipse = h.ellipse(f);
+  bool sterile = ledger_.countNewPixels(f, ellipse) == 0;
+  for (std::size_t m = 0; m < known.size() && sterile; ++m)
+    sterile = !(mahalanobisSquared(ellipse, known[m].pixel) <= kEllipseRadius2) ||
+              liesInLineage(h, f, known[m].pixel);
+  candidate.checked = state + (sterile ? 1 : 0);
+  return sterile;
+}
+
+/// Makes f a candidate of h if its ellipse can be searched and lies in none of the lineage.
+void Mixture::addCandidate(Hypothesis& h, int f) const {
+  const Marginal& marginal = h.joint->marginal(f);
+  if (!(marginal.determinant > 0.0) || !h.mean[slot(f)].allFinite()) return;
+  const SearchEllipse ellipse = h.ellipse(f);
+  Hypothesis::Candidate candidate;
+  candidate.feature = f;
+  candidate.clipped = reachesBeyond(ellipse, valid_[slot(f)]);
+  if (candidate.clipped) {
+    const ClippedEllipse clipped(ellipse, valid_[slot(f)]);
+    constexpr double kLeastArea = 1e-3;  // px^2: no pixel to look at
+    candidate.area = clipped.area();
+    if (candidate.area < kLeastArea) return;
+    candidate.mass = clipped.mass(ellipse.center, ellipse.covariance);
+    candidate.child = likelihood(f).match * candidate.mass;
+    candidate.child_log = candidate.child > 0.0 ? candidate.child * std::log(candidate.child) : 0.0;
+  } else {
+    candidate.area = kEllipseRadius2 * M_PI * std::sqrt(marginal.determinant);
+    candidate.mass = kEllipseMass;
+    candidate.child = likelihood(f).match * kEllipseMass;
+    candidate.child_log = likelihood(f).child_log;
+  }
+  for (int i = h.lineage[slot(f)]; i >= 0; i = searched_[slot(i)].next)
+    if (liesInside(ellipse, searched_[slot(i)].ellipse)) return;
+  h.candidate_of[slot(f)] = static_cast<int>(h.candidates.size());
+  h.candidates.push_back(candidate);
+}
+
+Hypothesis Mixture::spawn(const Hypothesis& parent, int f, int match) const {
+  Hypothesis child;
+  child.parent = parent.id;
+  child.joint = joint_.measure(parent.joint, f);
+  child.mean = parent.mean;
+  child.match = parent.match;
+  child.lineage = parent.lineage;
+  const Eigen::Vector2d found = ledger_.matches(f)[slot(match)].pixel;
+  const Eigen::Vector2d weighted =
+      child.joint->measuredPrecision() * (found - parent.mean[slot(f)]);
+  const std::vector<int>& touched = child.joint->touched();
+  for (std::size_t i = 0; i < touched.size(); ++i)
+    child.mean[slot(touched[i])].noalias() += child.joint->cross(i) * weighted;
+  child.mean[slot(f)] = found;
+  child.match[slot(f)] = match;
+  std::vector<char> is_changed(child.mean.size(), 0);
+  is_changed[slot(f)] = 1;
+  for (const int t : touched) is_changed[slot(t)] = 1;
+  for (const Hypothesis::PixelMass& known : parent.pixel_masses)
+    if (!is_changed[slot(known.feature)]) child.pixel_masses.push_back(known);
+  child.candidate_of.assign(child.mean.size(), -1);
+  child.candidates.reserve(parent.candidates.size());
+  for (int t = 0; t < joint_.size(); ++t) {
+    if (child.isFused(t)) continue;
+    if (is_changed[slot(t)]) {
+      addCandidate(child, t);
+      continue;
+    }
+    // With the parent's marginal: what the parent has searched or cannot search is closed here too.
+    const int c = parent.candidate_of[slot(t)];
+    if (c < 0 || !parent.candidates[slot(c)].open) continue;
+    child.candidate_of[slot(t)] = static_cast<int>(child.candidates.size());
+    child.candidates.push_back(parent.candidates[slot(c)]);
+  }
+  return child;
+}
+
+void Mixture::inheritTerms(int born, int parent_index, int f) {
+  Hypothesis& child = hypotheses_[slot(born)];
+  const Hypothesis& parent = hypotheses_[slot(parent_index)];
+  child.slot = pairs_.acquire();
+  if (child.slot < 0 || parent.slot < 0) return;
+  // Where all has changed all is unknown.
+  std::vector<char> is_changed(child.mean.size(), 0);
+  is_changed[slot(f)] = 1;
+  for (const int t : child.joint->touched()) is_changed[slot(t)] = 1;
+  const auto fill = [&](PairTable::Row& to, const PairTable::Row& from, const Hypothesis& to_list,
+                        const Hypothesis& from_list) {
+    if (from.empty()) return;
+    for (std::size_t c = 0; c < to_list.candidates.size(); ++c) {
+      const int t = to_list.candidates[c].feature;
+      if (is_changed[slot(t)]) continue;
+      const int old = from_list.candidate_of[slot(t)];
+      if (old < 0) continue;
+      if (to.empty()) to.resize(to_list.candidates.size());
+      to[c] = from[slot(old)];
+    }
+  };
+  for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
+    const Hypothesis& other = hypotheses_[slot(k)];
+    if (other.slot < 0 || k == born || k == parent_index) continue;
+    fill(pairs_.row(other.slot, child.slot), pairs_.row(other.slot, parent.slot), child, parent);
+    fill(pairs_.row(child.slot, other.slot), pairs_.row(parent.slot, other.slot), other, other);
+  }
+  fill(pairs_.row(child.slot, child.slot), pairs_.row(parent.slot, parent.slot), child, parent);
+  // Where both have one marginal, each holds the other's own mass.
+  const auto fillOwn = [&](PairTable::Row& row, const Hypothesis& in) {
+    for (std::size_t c = 0; c < in.candidates.size(); ++c) {
+      if (is_changed[slot(in.candidates[c].feature)]) continue;
+      if (row.empty()) row.resize(in.candidates.size());
+      row[c].mass = in.candidates[c].mass;
+    }
+  };
+  fillOwn(pairs_.row(parent.slot, child.slot), child);
+  fillOwn(pairs_.row(child.slot, parent.slot), parent);
+}
+
+SearchOutcome Mixture::searchOnly(int g, int c) {
+  Hypothesis& h = hypotheses_[slot(g)];
+  const int f = h.candidates[slot(c)].feature;
+  const SearchEllipse ellipse = h.ellipse(f);
+  SearchOutcome outcome = ledger_.search(f, ellipse);
+  searched_.push_back({ellipse, h.lineage[slot(f)]});
+  h.lineage[slot(f)] = static_cast<int>(searched_.size()) - 1;
+  h.candidates[slot(c)].open = false;
+  return outcome;
+}
+
+void Mixture::fuse(int g, int f, int match) {
+  Hypothesis& h = hypotheses_[slot(g)];
+  Hypothesis fused = spawn(h, f, match);
+  fused.id = h.id;
+  fused.parent = h.parent;
+  fused.log_weight = h.log_weight;
+  fused.weight = h.weight;
+  pairs_.release(h.slot);
+  fused.slot = pairs_.acquire();
+  h = std::move(fused);
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,146 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "active_matching_slam/matching/match_result.h"
+#include "active_matching_slam/matching/search_ellipse.h"
+#include "joint.h"
+#include "pair_table.h"
+#include "search_ledger.h"
+
+namespace active_matching_slam {
+
+/// Likelihood of what a search of a feature brings, divided by that of nothing but clutter (Chli
+/// 2009, eq. 5.5-5.8): no power of the number of pixels is ever formed.
+struct SearchLikelihood {
+  double in = 0.0;            ///< the feature is inside and was missed: Pfn / Ptn
+  double match = 0.0;         ///< one of the matches is the feature: Ptp / Pfp
+  double child_log = 0.0;     ///< c ln(c), c = match * mass of a whole ellipse
+  double clutter_odds = 0.0;  ///< Pfp / Ptn
+
+  explicit SearchLikelihood(const FeatureRates& rates)
+      : in((1.0 - rates.true_positive) / (1.0 - rates.false_positive)),
+        match(rates.true_positive / rates.false_positive),
+        clutter_odds(rates.false_positive / (1.0 - rates.false_positive)) {
+    const double child = match * kEllipseMass;
+    child_log = child * std::log(child);
+  }
+};
+
+/// One Gaussian of the mixture: a scenario of matches, and what it expects of the features left.
+struct Hypothesis {
+  /// A feature that can be searched here.
+  struct Candidate {
+    int feature = -1;
+    bool open = true;           ///< not searched here yet
+    bool clipped = false;       ///< the ellipse reaches beyond the valid area
+    double area = 0.0;          ///< of the 3-sigma ellipse inside the valid area [px^2]
+    double mass = 0.0;          ///< own probability mass inside
+    double child = 0.0;         ///< match * mass: a match's factor for the child
+    double child_log = 0.0;     ///< child * ln(child)
+    std::int64_t checked = -1;  ///< cache of Mixture::isSterile
+  };
+  /// Sum of p over the pixels searched when they were that many.
+  struct PixelMass {
+    int feature;
+    double sum;
+    std::int64_t pixels;
+  };
+  int id = 0, parent = -1;
+  double log_weight = 0.0, weight = 1.0;
+  std::shared_ptr<const Conditional> joint;
+  std::vector<Eigen::Vector2d> mean;    ///< F, the match for a fused feature [px]
+  std::vector<int> match;               ///< F, -1: not fused
+  std::vector<int> lineage;             ///< F, newest ellipse searched, in Mixture's pool; -1: none
+  std::vector<Candidate> candidates;    ///< by feature, as they were at birth
+  std::vector<int> candidate_of;        ///< F, index into candidates; -1: none
+  std::vector<PixelMass> pixel_masses;  ///< cache
+  int slot = -1;                        ///< in the table of pairs
+
+  Eigen::Matrix2d covariance(int f) const { return joint->marginal(f).covariance; }
+  SearchEllipse ellipse(int f) const {
+    return {mean[static_cast<std::size_t>(f)], joint->marginal(f).covariance};
+  }
+  bool isFused(int f) const { return match[static_cast<std::size_t>(f)] >= 0; }
+  bool hasOpenCandidate() const {
+    for (const Candidate& c : candidates)
+      if (c.open) return true;
+    return false;
+  }
+};
+
+/// The mixture of Gaussians of Active Matching (Chli 2009, section 5.3): `sum_k lambda_k G(z_k,
+/// S_k)`, over any representation of the joint, with the two rules of update.
+class Mixture {
+ public:
+  Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
+          std::vector<SearchLikelihood> likelihoods, const MatchOptions& options);
+
+  int features() const { return joint_.size(); }
+  /// In order of creation, weights normalised.
+  const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
+  /// Index of the heaviest (ties: the lower id).
+  int heaviest() const;
+  const SearchLikelihood& likelihood(int f) const {
+    return likelihoods_[static_cast<std::size_t>(f)];
+  }
+  /// Mass of hypothesis k's marginal inside g's ellipse, both of g's candidate c (indices, not
+  /// ids).
+  double mass(int k, int c, int g);
+  /// The same with the factors that follow from it.
+  const PairTerm& term(int k, int c, int g);
+  /// Rule incremental: a search of candidate c of g would see neither a new pixel nor a match that
+  /// is known but outside the ellipses that g or its ancestors searched.
+  bool isSterile(int g, int c);
+
+  /// Searches candidate c of hypothesis g and updates the mixture. `step` gets what came of it.
+  void searchAndUpdate(int g, int c, MatchStep& step);
+  /// Fuses a match of feature f into g without asking the others; g keeps its id and weight.
+  void fuse(int g, int f, int match);
+  /// Searches candidate c of hypothesis g, and marks it as searched, without an update.
+  SearchOutcome searchOnly(int g, int c);
+
+  int mostGaussians() const { return most_gaussians_; }
+  bool wasCapped() const { return was_capped_; }
+
+ private:
+  struct SearchedEllipse {
+    SearchEllipse ellipse;
+    int next;  ///< older one of the same feature and lineage, -1: none
+  };
+  struct Child {
+    int match;
+    double log_weight;
+  };
+
+  bool liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const;
+  void addCandidate(Hypothesis& h, int f) const;
+  double pixelMass(Hypothesis& h, int f);
+  /// Z_kf of rule incremental.
+  double explained(Hypothesis& h, int f);
+  void updateIncremental(int g, int c, MatchStep& step, std::vector<Child>& children);
+  void updateThesis(int g, int c, MatchStep& step, std::vector<Child>& children);
+  void reweigh(int g, int f, const std::vector<Child>& children, MatchStep& step);
+  Hypothesis spawn(const Hypothesis& parent, int f, int match) const;
+  /// Terms that the child `born` has in common with its parent (indices).
+  void inheritTerms(int born, int parent, int f);
+
+  const Joint& joint_;
+  SearchLedger& ledger_;
+  const MatchOptions& options_;
+  std::vector<SearchLikelihood> likelihoods_;
+  std::vector<PixelBox> valid_;
+  std::vector<Hypothesis> hypotheses_;
+  std::vector<SearchedEllipse> searched_;
+  PairTable pairs_;
+  PairTerm scratch_;  // of a Gaussian without a slot
+  int next_id_ = 1;
+  int most_gaussians_ = 1;
+  bool was_capped_ = false;
+};
+
+}  // namespace active_matching_slam

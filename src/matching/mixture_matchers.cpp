@@ -1,0 +1,113 @@
+#include "mixture_matchers.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "active_matching_slam/information/chow_liu_tree.h"
+#include "active_matching_slam/information/gaussian_information.h"
+#include "active_matching_slam/matching/search_ellipse.h"
+#include "mixture_run.h"
+
+namespace active_matching_slam {
+namespace {
+
+MatchResult matchDense(const MeasurementPrior& given, FeatureSearch& search,
+                       const MatchOptions& options, MixtureRun::Policy policy, const char* name) {
+  ProperPrior prior(given);
+  SearchLedger ledger(prior, search, options);
+  const double start = ledger.now();
+  FeatureInformation information = featureInformation(prior.S());
+  if (information.regularisation > 0.0) {
+    prior.leaveOutDependent();
+    information = featureInformation(prior.S());
+  }
+  MatchResult result = ledger.begin(name);
+  if (prior.size() > 0) {
+    const auto joint =
+        makeDenseJoint(prior.S(), information.precision_determinant, given.noise_variance_px2);
+    result.statistics.information_ms = 1e3 * (ledger.now() - start);
+    MixtureRun(given, prior, *joint, ledger, options, policy).run(result);
+  }
+  ledger.finish(result);
+  return result;
+}
+
+/// The tree of the prior, without features that a neighbour determines exactly.
+ChowLiuTree properTree(ProperPrior& prior) {
+  while (true) {
+    ChowLiuTree tree = chowLiuTree(prior.S());
+    int dependent = -1;
+    for (std::size_t e = 0; e < tree.edges.size() && dependent < 0; ++e) {
+      const auto i = static_cast<std::size_t>(tree.edges[e].first);
+      const auto j = static_cast<std::size_t>(tree.edges[e].second);
+      const Eigen::Matrix2d& cross = tree.cross_covariances[e];
+      const Eigen::Matrix2d conditional =
+          tree.marginals[j] - cross.transpose() * tree.marginals[i].inverse() * cross;
+      constexpr double kSingular = 1e-11;
+      const bool proper =
+          isProperCovariance(conditional) &&
+          (conditional.diagonal().array() > kSingular * tree.marginals[j].diagonal().array()).all();
+      if (!proper) dependent = tree.edges[e].second;
+    }
+    if (dependent < 0) return tree;
+    prior.leaveOut(dependent);
+  }
+}
+
+/// Milliseconds that `active` takes on one core of the year 2020: cubic in the features, and in
+/// proportion to the clutter that the prior's ellipses will hold.
+double modelledMilliseconds(const MeasurementPrior& prior, const MatchOptions& options) {
+  const double features = prior.size();
+  double clutter = 0.0;
+  for (int f = 0; f < prior.size(); ++f) {
+    const FeatureRates& rates = prior.rates.empty() || !options.use_feature_rates
+                                    ? options.default_rates
+                                    : prior.rates[static_cast<std::size_t>(f)];
+    const double area = ellipseArea(prior.covariance(f));
+    if (std::isfinite(area)) clutter += area * rates.false_positive;
+  }
+  const double hundreds = 0.01 * features;
+  return (1.5 * hundreds + 1.5 * hundreds * hundreds * hundreds) *
+         (1.0 + 2.0 * clutter / std::max(features, 1.0));
+}
+
+}  // namespace
+
+MatchResult ActiveMatcher::match(const MeasurementPrior& prior, FeatureSearch& search,
+                                 const MatchOptions& options) {
+  return matchDense(prior, search, options, MixtureRun::Policy::kFull, "active");
+}
+
+MatchResult FastActiveMatcher::match(const MeasurementPrior& prior, FeatureSearch& search,
+                                     const MatchOptions& options) {
+  return matchDense(prior, search, options, MixtureRun::Policy::kFast, "fast_active");
+}
+
+MatchResult ChowLiuMatcher::match(const MeasurementPrior& given, FeatureSearch& search,
+                                  const MatchOptions& options) {
+  ProperPrior prior(given);
+  SearchLedger ledger(prior, search, options);
+  const double start = ledger.now();
+  const ChowLiuTree tree = properTree(prior);
+  MatchResult result = ledger.begin("chow_liu");
+  for (const WeightedEdge& edge : tree.edges)
+    result.tree_edges.emplace_back(prior.original(edge.first), prior.original(edge.second));
+  if (prior.size() > 0) {
+    const auto joint = makeTreeJoint(tree, given.noise_variance_px2);
+    result.statistics.tree_ms = 1e3 * (ledger.now() - start);
+    MixtureRun(given, prior, *joint, ledger, options, MixtureRun::Policy::kFull).run(result);
+  }
+  ledger.finish(result);
+  return result;
+}
+
+MatchResult AutoMatcher::match(const MeasurementPrior& prior, FeatureSearch& search,
+                               const MatchOptions& options) {
+  const double limit =
+      options.max_milliseconds > 0.0 ? options.max_milliseconds : options.auto_milliseconds;
+  if (modelledMilliseconds(prior, options) <= limit) return active_.match(prior, search, options);
+  return chow_liu_.match(prior, search, options);
+}
+
+}  // namespace active_matching_slam

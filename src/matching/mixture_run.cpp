@@ -1,0 +1,195 @@
+#include "mixture_run.h"
+
+#include <algorithm>
+
+#include "active_matching_slam/matching/search_ellipse.h"
+
+namespace active_matching_slam {
+namespace {
+
+std::size_t slot(int i) { return static_cast<std::size_t>(i); }
+
+std::vector<SearchLikelihood> likelihoodsOf(const MeasurementPrior& given, const ProperPrior& prior,
+                                            const MatchOptions& options) {
+  std::vector<SearchLikelihood> likelihoods;
+  for (int f = 0; f < prior.size(); ++f)
+    likelihoods.emplace_back(given.rates.empty() || !options.use_feature_rates
+                                 ? options.default_rates
+                                 : given.rates[slot(prior.original(f))]);
+  return likelihoods;
+}
+
+double informationLeft(const Hypothesis& h) {
+  double bits = 0.0;
+  for (std::size_t f = 0; f < h.match.size(); ++f)
+    if (h.match[f] < 0) bits += h.joint->marginal(static_cast<int>(f)).information_bits;
+  return bits;
+}
+
+}  // namespace
+
+MixtureRun::MixtureRun(const MeasurementPrior& given, const ProperPrior& prior, const Joint& joint,
+                       SearchLedger& ledger, const MatchOptions& options, Policy policy)
+    : prior_(prior),
+      ledger_(ledger),
+      options_(options),
+      policy_(policy),
+      mixture_(prior, joint, ledger, likelihoodsOf(given, prior, options), options),
+      choice_(mixture_, options.update_rule == UpdateRule::kIncremental),
+      random_(options.seed) {}
+
+void MixtureRun::run(MatchResult& result) {
+  MatchStatistics& statistics = result.statistics;
+  statistics.information_bits_start = informationLeft(mixture_.hypotheses().front());
+  const double correlation_before = ledger_.correlationSeconds();
+  double information_s = 0.0;
+  const double start = ledger_.now();
+  while (!isFinished()) {
+    if (ledger_.isOverBudget()) {
+      statistics.cut_short = true;
+      break;
+    }
+    if (policy_ == Policy::kFast && latched_ &&
+        mixture_.hypotheses()[slot(mixture_.heaviest())].weight > options_.fast_accept_weight) {
+      acceptNearest(result);
+      break;
+    }
+    const double before_choice = ledger_.now();
+    const Measurement next = choose();
+    information_s += ledger_.now() - before_choice;
+    if (!next.exists()) break;
+    MatchStep step = begin(next);
+    mixture_.searchAndUpdate(next.hypothesis, next.candidate, step);
+    record(std::move(step), result);
+  }
+  statistics.cut_short |= mixture_.wasCapped();
+  report(result);
+  const double correlation_s = ledger_.correlationSeconds() - correlation_before;
+  statistics.information_ms += 1e3 * information_s;
+  statistics.mixture_ms += 1e3 * (ledger_.now() - start - information_s - correlation_s);
+}
+
+bool MixtureRun::isFinished() const {
+  if (options_.finish_weight <= 0.0) return false;
+  const Hypothesis& h = mixture_.hypotheses()[slot(mixture_.heaviest())];
+  return h.weight >= options_.finish_weight && !h.hasOpenCandidate();
+}
+
+Measurement MixtureRun::choose() {
+  if (latched_) return chooseAfterLatch();
+  if (policy_ == Policy::kFast) {
+    double most_bits = 0.0;
+    const Measurement next = choice_.bestOfDrawn(options_.fast_candidates, random_, most_bits);
+    latched_ = next.exists() && most_bits < options_.fast_latch_bits;
+    return next;
+  }
+  const Measurement next = choice_.best();
+  if (!next.exists() || next.expected.bits() >= options_.latch_information_bits) return next;
+  if (options_.latch_information_bits <= 0.0) return next;
+  latched_ = true;
+  return chooseAfterLatch();
+}
+
+/// The heaviest Gaussian's lowest candidate; FAM goes on to the next heaviest when it has none.
+Measurement MixtureRun::chooseAfterLatch() {
+  if (policy_ == Policy::kFull) return choice_.firstOf(mixture_.heaviest());
+  std::vector<int> order;
+  for (int k = 0; k < static_cast<int>(mixture_.hypotheses().size()); ++k) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return mixture_.hypotheses()[slot(a)].weight > mixture_.hypotheses()[slot(b)].weight;
+  });
+  for (const int k : order) {
+    const Measurement next = choice_.firstOf(k);
+    if (next.exists()) return next;
+  }
+  return {};
+}
+
+/// FAM: a dominant Gaussian after the latch takes the match nearest to each prediction that is
+/// left.
+void MixtureRun::acceptNearest(MatchResult& result) {
+  const int dominant = mixture_.heaviest();
+  while (true) {
+    const Measurement next = choice_.firstOf(dominant);
+    if (!next.exists()) return;
+    if (ledger_.isOverBudget()) {
+      result.statistics.cut_short = true;
+      return;
+    }
+    MatchStep step = begin(next);
+    const int feature =
+        mixture_.hypotheses()[slot(dominant)].candidates[slot(next.candidate)].feature;
+    const SearchOutcome outcome = mixture_.searchOnly(dominant, next.candidate);
+    step.pixels_in_ellipse = outcome.pixels_in_ellipse;
+    step.pixels_new = outcome.pixels_new;
+    step.matches = outcome.matches;
+    int nearest = -1;
+    double nearest2 = 0.0;
+    for (const int m : outcome.matches) {
+      const double d2 = mahalanobisSquared(step.ellipse, ledger_.matches(feature)[slot(m)].pixel);
+      if (nearest >= 0 && d2 >= nearest2) continue;
+      nearest = m;
+      nearest2 = d2;
+    }
+    if (nearest >= 0) {
+      mixture_.fuse(dominant, feature, nearest);
+      step.spawned.push_back(nearest);
+    }
+    record(std::move(step), result);
+  }
+}
+
+MatchStep MixtureRun::begin(const Measurement& measurement) const {
+  const Hypothesis& h = mixture_.hypotheses()[slot(measurement.hypothesis)];
+  const Hypothesis::Candidate& candidate = h.candidates[slot(measurement.candidate)];
+  MatchStep step;
+  step.feature = prior_.original(candidate.feature);
+  step.gaussian = h.id;
+  step.ellipse = h.ellipse(candidate.feature);
+  step.area_px = candidate.area;
+  step.evaluated = measurement.expected.null_probability > 0.0;
+  step.discrete_information_bits = measurement.expected.discrete_bits;
+  step.continuous_information_bits = measurement.expected.continuous_bits;
+  step.mutual_information_bits = h.joint->marginal(candidate.feature).information_bits;
+  step.score = measurement.expected.score;
+  step.null_probability = measurement.expected.null_probability;
+  return step;
+}
+
+void MixtureRun::record(MatchStep step, MatchResult& result) const {
+  if (options_.keep_trace) result.trace.push_back(std::move(step));
+}
+
+std::vector<int> MixtureRun::matchesOf(const Hypothesis& h) const {
+  std::vector<int> matches(slot(prior_.size() + prior_.leftOut()), -1);
+  for (int f = 0; f < prior_.size(); ++f) matches[slot(prior_.original(f))] = h.match[slot(f)];
+  return matches;
+}
+
+void MixtureRun::report(MatchResult& result) const {
+  const Hypothesis& accepted = mixture_.hypotheses()[slot(mixture_.heaviest())];
+  MatchStatistics& statistics = result.statistics;
+  statistics.max_gaussians = mixture_.mostGaussians();
+  statistics.information_bits_end = informationLeft(accepted);
+  statistics.accepted_weight = accepted.weight;
+  for (const Hypothesis& h : mixture_.hypotheses())
+    result.hypotheses.push_back({h.id, h.parent, h.weight, matchesOf(h)});
+  std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(),
+                   [](const MatchHypothesis& a, const MatchHypothesis& b) {
+                     return a.probability > b.probability;
+                   });
+  result.match_of_feature = result.hypotheses.front().match_of_feature;
+  statistics.ambiguous = accepted.weight < options_.ambiguous_below_weight;
+  if (!statistics.ambiguous) return;
+  // Strong are the heaviest hypotheses that together reach the weight asked for.
+  double together = accepted.weight;
+  for (std::size_t k = 1;
+       k < result.hypotheses.size() && together < options_.ambiguous_below_weight; ++k) {
+    together += result.hypotheses[k].probability;
+    for (std::size_t f = 0; f < result.match_of_feature.size(); ++f)
+      if (result.hypotheses[k].match_of_feature[f] != result.match_of_feature[f])
+        result.match_of_feature[f] = -1;
+  }
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <vector>
+
+#include "joint.h"
+#include "measurement_choice.h"
+#include "mixture.h"
+#include "search_ledger.h"
+
+namespace active_matching_slam {
+
+/// One frame of Active Matching on a joint Gaussian: choose, search, update, until a stop rule
+/// fires or nothing is left.
+class MixtureRun {
+ public:
+  enum class Policy { kFull, kFast };
+
+  /// `given` is the prior as handed in, `prior` its proper part.
+  MixtureRun(const MeasurementPrior& given, const ProperPrior& prior, const Joint& joint,
+             SearchLedger& ledger, const MatchOptions& options, Policy policy);
+
+  /// Runs, and fills the result (but for what SearchLedger::finish writes).
+  void run(MatchResult& result);
+
+ private:
+  /// The next search, none when done. Sets the latch.
+  Measurement choose();
+  Measurement chooseAfterLatch();
+  bool isFinished() const;
+  void acceptNearest(MatchResult& result);
+  MatchStep begin(const Measurement& measurement) const;
+  void record(MatchStep step, MatchResult& result) const;
+  void report(MatchResult& result) const;
+  std::vector<int> matchesOf(const Hypothesis& h) const;
+
+  const ProperPrior& prior_;
+  SearchLedger& ledger_;
+  const MatchOptions& options_;
+  Policy policy_;
+  Mixture mixture_;
+  MeasurementChoice choice_;
+  std::mt19937_64 random_;
+  bool latched_ = false;
+};
+
+}  // namespace active_matching_slam

@@ -1,0 +1,210 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "active_matching_slam/matching/search_ellipse.h"
+#include "gaussian_mass.h"
+#include "mixture.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Below this a likelihood is taken as this: a logarithm must stay finite.
+constexpr double kLeastLikelihood = 1e-9;
+
+std::size_t slot(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+double Mixture::pixelMass(Hypothesis& h, int f) {
+  const PixelMask& mask = ledger_.searchedPixels(f);
+  Hypothesis::PixelMass* known = nullptr;
+  for (Hypothesis::PixelMass& entry : h.pixel_masses)
+    if (entry.feature == f) known = &entry;
+  if (!known) {
+    h.pixel_masses.push_back({f, 0.0, -1});
+    known = &h.pixel_masses.back();
+  }
+  if (known->pixels != mask.size()) {
+    known->sum = massOnPixels(mask, h.mean[slot(f)], h.covariance(f));
+    known->pixels = mask.size();
+  }
+  return std::min(1.0, known->sum);
+}
+
+/// match * sum of p over the matches outside the own lineage + in * max(0, A - sum of p over all) +
+/// 1 - A
+double Mixture::explained(Hypothesis& h, int f) {
+  const std::vector<SearchMatch>& known = ledger_.matches(f);
+  const double searched_mass = pixelMass(h, f);
+  const Eigen::Matrix2d covariance = h.covariance(f);
+  double all = 0.0, foreign = 0.0;
+  for (const SearchMatch& m : known) {
+    const double p = massOfPixel(m.pixel, h.mean[slot(f)], covariance);
+    all += p;
+    if (!liesInLineage(h, f, m.pixel)) foreign += p;
+  }
+  const SearchLikelihood& likelihood = this->likelihood(f);
+  const double z = likelihood.match * foreign + likelihood.in * std::max(0.0, searched_mass - all) +
+                   1.0 - searched_mass;
+  return std::max(z, kLeastLikelihood);
+}
+
+void Mixture::updateIncremental(int g, int c, MatchStep& step, std::vector<Child>& children) {
+  const int f = hypotheses_[slot(g)].candidates[slot(c)].feature;
+  const auto counts = [&](const Hypothesis& h) {
+    return !h.isFused(f) && h.joint->marginal(f).determinant > 0.0;
+  };
+  // Nobody has searched the feature: every Z is 1.
+  const bool fresh = ledger_.searchedPixels(f).size() == 0 && ledger_.matches(f).empty();
+  std::vector<double> before(hypotheses_.size(), 1.0);
+  for (std::size_t k = 0; k < hypotheses_.size() && !fresh; ++k)
+    if (counts(hypotheses_[k])) before[k] = explained(hypotheses_[k], f);
+  Hypothesis& searcher = hypotheses_[slot(g)];
+  const int lineage_before = searcher.lineage[slot(f)];
+  const SearchOutcome outcome = searchOnly(g, c);
+  step.pixels_in_ellipse = outcome.pixels_in_ellipse;
+  step.pixels_new = outcome.pixels_new;
+  step.matches = outcome.matches;
+  // Only what neither g nor its ancestors have seen spawns.
+  const double base = searcher.log_weight - std::log(before[slot(g)]);
+  const Eigen::Matrix2d covariance = searcher.covariance(f);
+  const int lineage_after = searcher.lineage[slot(f)];
+  searcher.lineage[slot(f)] = lineage_before;
+  for (const int m : outcome.matches) {
+    const Eigen::Vector2d& pixel = ledger_.matches(f)[slot(m)].pixel;
+    if (liesInLineage(searcher, f, pixel)) continue;
+    const double p = massOfPixel(pixel, searcher.mean[slot(f)], covariance);
+    children.push_back({m, base + std::log(likelihood(f).match * p)});
+  }
+  searcher.lineage[slot(f)] = lineage_after;
+  for (std::size_t k = 0; k < hypotheses_.size(); ++k)
+    if (counts(hypotheses_[k]))
+      hypotheses_[k].log_weight += std::log(explained(hypotheses_[k], f) / before[k]);
+}
+
+void Mixture::updateThesis(int g, int c, MatchStep& step, std::vector<Child>& children) {
+  const int f = hypotheses_[slot(g)].candidates[slot(c)].feature;
+  const SearchLikelihood& likelihood = this->likelihood(f);
+  const double base = hypotheses_[slot(g)].log_weight;
+  const SearchOutcome outcome = searchOnly(g, c);
+  step.pixels_in_ellipse = outcome.pixels_in_ellipse;
+  step.pixels_new = outcome.pixels_new;
+  step.matches = outcome.matches;
+  for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
+    Hypothesis& h = hypotheses_[slot(k)];
+    if (!(h.joint->marginal(f).determinant > 0.0)) continue;
+    const Eigen::Matrix2d covariance = h.covariance(f);
+    double sum = 0.0;
+    for (const int m : outcome.matches) {
+      const double p = massOfPixel(ledger_.matches(f)[slot(m)].pixel, h.mean[slot(f)], covariance);
+      sum += p;
+      if (k == g) children.push_back({m, base + std::log(likelihood.match * p)});
+    }
+    const double inside = mass(k, c, g);
+    const double factor = (k == g ? 0.0 : likelihood.match * sum) +
+                          likelihood.in * std::max(0.0, inside - sum) + 1.0 - inside;
+    h.log_weight += std::log(std::max(factor, kLeastLikelihood));
+  }
+}
+
+void Mixture::searchAndUpdate(int g, int c, MatchStep& step) {
+  const int f = hypotheses_[slot(g)].candidates[slot(c)].feature;
+  std::vector<Child> children;
+  if (options_.update_rule == UpdateRule::kIncremental) {
+    updateIncremental(g, c, step, children);
+  } else {
+    updateThesis(g, c, step, children);
+  }
+  for (const Child& child : children) step.spawned.push_back(child.match);
+  reweigh(g, f, children, step);
+}
+
+/// Normalises, drops what is too light, and only then makes the children: thousands of spurious
+/// matches cost thousands of weights, not thousands of Gaussians.
+void Mixture::reweigh(int g, int f, const std::vector<Child>& children, MatchStep& step) {
+  struct Entry {
+    int index;  ///< of a hypothesis, or of a child after them
+    int id, parent;
+    double weight;
+  };
+  const int old_count = static_cast<int>(hypotheses_.size());
+  const int searcher_id = hypotheses_[slot(g)].id;
+  double most = -std::numeric_limits<double>::infinity();
+  for (const Hypothesis& h : hypotheses_) most = std::max(most, h.log_weight);
+  for (const Child& child : children) most = std::max(most, child.log_weight);
+  std::vector<Entry> entries;
+  for (int k = 0; k < old_count; ++k) {
+    const Hypothesis& h = hypotheses_[slot(k)];
+    entries.push_back({k, h.id, h.parent, std::exp(h.log_weight - most)});
+  }
+  for (std::size_t c = 0; c < children.size(); ++c)
+    entries.push_back({old_count + static_cast<int>(c), next_id_ + static_cast<int>(c), searcher_id,
+                       std::exp(children[c].log_weight - most)});
+  next_id_ += static_cast<int>(children.size());
+  most_gaussians_ = std::max(most_gaussians_, static_cast<int>(entries.size()));
+  const auto normalise = [&] {
+    double sum = 0.0;
+    for (const Entry& e : entries) sum += e.weight;
+    for (Entry& e : entries) e.weight /= sum;
+  };
+  const auto record = [&](std::vector<MatchStep::GaussianWeight>& weights) {
+    if (!options_.keep_trace) return;
+    for (const Entry& e : entries) weights.push_back({e.id, e.parent, e.weight});
+  };
+  normalise();
+  record(step.weights);
+  double heaviest = 0.0;
+  for (const Entry& e : entries) heaviest = std::max(heaviest, e.weight);
+  double least = std::min(options_.prune_weight, heaviest);
+  const auto limit = slot(options_.max_gaussians);
+  const auto dropLight = [&] {
+    entries.erase(std::remove_if(entries.begin(), entries.end(),
+                                 [&](const Entry& e) { return e.weight < least; }),
+                  entries.end());
+  };
+  dropLight();
+  if (limit > 0 && entries.size() > limit) {
+    std::vector<Entry> ordered = entries;
+    std::stable_sort(ordered.begin(), ordered.end(),
+                     [](const Entry& a, const Entry& b) { return a.weight > b.weight; });
+    ordered.resize(limit);
+    std::sort(ordered.begin(), ordered.end(),
+              [](const Entry& a, const Entry& b) { return a.index < b.index; });
+    entries = std::move(ordered);
+    was_capped_ = true;
+  }
+  normalise();
+  record(step.pruned);
+
+  // Slots of what dies are free for what is born, but the parent is needed until then.
+  std::vector<char> lives(hypotheses_.size(), 0);
+  for (const Entry& e : entries)
+    if (e.index < old_count) lives[slot(e.index)] = 1;
+  for (int k = 0; k < old_count; ++k) {
+    if (lives[slot(k)] || k == g) continue;
+    pairs_.release(hypotheses_[slot(k)].slot);
+    hypotheses_[slot(k)].slot = -1;
+  }
+  hypotheses_.reserve(hypotheses_.size() + entries.size());
+  for (Entry& e : entries) {
+    if (e.index < old_count) continue;
+    hypotheses_.push_back(
+        spawn(hypotheses_[slot(g)], f, children[slot(e.index - old_count)].match));
+    e.index = static_cast<int>(hypotheses_.size()) - 1;
+    inheritTerms(e.index, g, f);
+  }
+  if (!lives[slot(g)]) pairs_.release(hypotheses_[slot(g)].slot);
+  std::vector<Hypothesis> next;
+  next.reserve(entries.size());
+  for (const Entry& e : entries) {
+    next.push_back(std::move(hypotheses_[slot(e.index)]));
+    next.back().id = e.id;
+    next.back().parent = e.parent;
+    next.back().weight = e.weight;
+    next.back().log_weight = std::log(e.weight);
+  }
+  hypotheses_ = std::move(next);
+}
+
+}  // namespace active_matching_slam

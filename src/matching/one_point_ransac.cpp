@@ -1,0 +1,135 @@
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <numeric>
+#include <random>
+
+#include "active_matching_slam/matching/search_ellipse.h"
+#include "baseline_matchers.h"
+#include "gate_search.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Which of the features in `voters` become hypotheses: all, or a seeded sample, ascending.
+std::vector<int> drawHypotheses(std::vector<int> voters, const MatchOptions& options) {
+  const auto wanted = static_cast<std::size_t>(options.ransac_max_hypotheses);
+  if (wanted == 0 || voters.size() <= wanted) return voters;
+  std::mt19937_64 random(options.seed);
+  for (std::size_t i = 0; i < wanted; ++i)
+    std::swap(voters[i], voters[i + random() % (voters.size() - i)]);
+  voters.resize(wanted);
+  std::sort(voters.begin(), voters.end());
+  return voters;
+}
+
+/// One frame's problem: `best[f]` is the match of highest score in the prior's gate, or -1.
+class OnePointRansac {
+ public:
+  OnePointRansac(const ProperPrior& prior, const SearchLedger& ledger, std::vector<int> best)
+      : prior_(prior), ledger_(ledger), best_(std::move(best)) {}
+
+  /// The low-innovation inliers of the best hypothesis.
+  std::vector<int> inliers(const std::vector<int>& hypotheses, double limit2) const {
+    std::vector<int> most;
+    for (const int h : hypotheses) {
+      const Eigen::Vector2d weighted =
+          prior_.covariance(h).inverse() * (bestPixel(h) - prior_.mean(h));
+      std::vector<int> inliers;
+      for (int f = 0; f < prior_.size(); ++f) {
+        if (best_[static_cast<std::size_t>(f)] < 0) continue;
+        const Eigen::Vector2d expected =
+            prior_.mean(f) + prior_.S().block<2, 2>(2 * f, 2 * h) * weighted;
+        if (f == h || (bestPixel(f) - expected).squaredNorm() < limit2) inliers.push_back(f);
+      }
+      if (inliers.size() > most.size()) most = std::move(inliers);
+    }
+    return most;
+  }
+
+  /// For each feature outside `inliers` the match of its gate that is nearest to what the inliers
+  /// predict, if inside their gate; -1 for the rest.
+  std::vector<int> rescued(const std::vector<int>& inliers,
+                           const std::vector<std::vector<int>>& gates, double gate2) const {
+    std::vector<int> rescued(static_cast<std::size_t>(prior_.size()), -1);
+    const int n = 2 * static_cast<int>(inliers.size());
+    Eigen::MatrixXd S_ii(n, n);
+    Eigen::VectorXd innovation(n);
+    for (int a = 0; a < n / 2; ++a) {
+      const int i = inliers[static_cast<std::size_t>(a)];
+      innovation.segment<2>(2 * a) = bestPixel(i) - prior_.mean(i);
+      for (int b = 0; b < n / 2; ++b)
+        S_ii.block<2, 2>(2 * a, 2 * b) =
+            prior_.S().block<2, 2>(2 * i, 2 * inliers[static_cast<std::size_t>(b)]);
+    }
+    const Eigen::LLT<Eigen::MatrixXd> llt(S_ii);
+    if (llt.info() != Eigen::Success) return rescued;
+    const Eigen::VectorXd y = llt.matrixL().solve(innovation);
+    std::vector<bool> is_inlier(static_cast<std::size_t>(prior_.size()), false);
+    for (const int i : inliers) is_inlier[static_cast<std::size_t>(i)] = true;
+    Eigen::MatrixXd cross(n, 2);
+    for (int f = 0; f < prior_.size(); ++f) {
+      const auto slot = static_cast<std::size_t>(f);
+      if (is_inlier[slot] || gates[slot].empty()) continue;
+      for (int a = 0; a < n / 2; ++a)
+        cross.middleRows<2>(2 * a) =
+            prior_.S().block<2, 2>(2 * inliers[static_cast<std::size_t>(a)], 2 * f);
+      llt.matrixL().solveInPlace(cross);
+      const SearchEllipse conditional{prior_.mean(f) + cross.transpose() * y,
+                                      prior_.covariance(f) - cross.transpose() * cross};
+      if (!isProperEllipse(conditional)) continue;
+      double nearest = gate2;
+      for (const int m : gates[slot]) {
+        const double d2 =
+            mahalanobisSquared(conditional, ledger_.matches(f)[static_cast<std::size_t>(m)].pixel);
+        if (d2 > nearest || (rescued[slot] >= 0 && d2 == nearest)) continue;
+        nearest = d2;
+        rescued[slot] = m;
+      }
+    }
+    return rescued;
+  }
+
+ private:
+  const Eigen::Vector2d& bestPixel(int f) const {
+    return ledger_.matches(f)[static_cast<std::size_t>(best_[static_cast<std::size_t>(f)])].pixel;
+  }
+
+  const ProperPrior& prior_;
+  const SearchLedger& ledger_;
+  std::vector<int> best_;
+};
+
+}  // namespace
+
+MatchResult OnePointRansacMatcher::match(const MeasurementPrior& given, FeatureSearch& search,
+                                         const MatchOptions& options) {
+  const ProperPrior prior(given);
+  SearchLedger ledger(prior, search, options);
+  MatchResult result = ledger.begin("one_point_ransac");
+  const auto gates = searchFullGates(prior, ledger);
+  std::vector<int> best, voters;
+  for (int f = 0; f < prior.size(); ++f) {
+    best.push_back(bestScore(ledger.matches(f), gates[static_cast<std::size_t>(f)]));
+    if (best.back() >= 0) voters.push_back(f);
+  }
+  const std::vector<int> hypotheses = drawHypotheses(voters, options);
+  result.statistics.nodes = static_cast<std::int64_t>(hypotheses.size());
+  const OnePointRansac ransac(prior, ledger, best);
+  const std::vector<int> inliers =
+      ransac.inliers(hypotheses, options.ransac_inlier_chi2 * given.noise_variance_px2);
+  result.statistics.inliers = static_cast<int>(inliers.size());
+  if (!inliers.empty()) {
+    const std::vector<int> rescued = ransac.rescued(inliers, gates, options.ransac_rescue_chi2);
+    for (int f = 0; f < prior.size(); ++f)
+      result.match_of_feature[static_cast<std::size_t>(prior.original(f))] =
+          rescued[static_cast<std::size_t>(f)];
+    for (const int i : inliers)
+      result.match_of_feature[static_cast<std::size_t>(prior.original(i))] =
+          best[static_cast<std::size_t>(i)];
+  }
+  ledger.finish(result);
+  return result;
+}
+
+}  // namespace active_matching_slam

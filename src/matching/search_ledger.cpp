@@ -1,0 +1,65 @@
+#include "search_ledger.h"
+
+#include <chrono>
+
+#include "active_matching_slam/matching/search_ellipse.h"
+
+namespace active_matching_slam {
+namespace {
+
+double steadySeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+SearchLedger::SearchLedger(const ProperPrior& prior, FeatureSearch& search,
+                           const MatchOptions& options)
+    : prior_(prior),
+      search_(search),
+      options_(options),
+      clock_s_(options.clock_s ? options.clock_s : steadySeconds),
+      start_s_(clock_s_()) {}
+
+SearchOutcome SearchLedger::search(int feature, const SearchEllipse& ellipse) {
+  const double start = now();
+  SearchOutcome outcome = search_.search(prior_.original(feature), ellipse);
+  correlation_s_ += now() - start;
+  ++searches_;
+  pixels_ += outcome.pixels_new;
+  return outcome;
+}
+
+bool SearchLedger::isOverBudget() const {
+  if (options_.max_pixels > 0 && pixels_ >= options_.max_pixels) return true;
+  return options_.max_milliseconds > 0.0 && elapsedMilliseconds() >= options_.max_milliseconds;
+}
+
+MatchResult SearchLedger::begin(const char* matcher) const {
+  MatchResult result;
+  const int total = prior_.size() + prior_.leftOut();
+  result.match_of_feature.assign(static_cast<std::size_t>(total), -1);
+  result.statistics.matcher = matcher;
+  result.statistics.candidates = total;
+  result.statistics.degenerate_features = prior_.leftOut();
+  for (int f = 0; f < prior_.size(); ++f)
+    result.statistics.pixels_full_gates +=
+        countEllipsePixels({prior_.mean(f), prior_.covariance(f)}, validArea(f));
+  return result;
+}
+
+void SearchLedger::finish(MatchResult& result) const {
+  MatchStatistics& s = result.statistics;
+  s.matched = 0;
+  for (const int match : result.match_of_feature) s.matched += match >= 0;
+  s.searches = searches_;
+  s.pixels_searched = pixels_;
+  s.matches_met = 0;
+  for (int f = 0; f < prior_.size(); ++f) s.matches_met += static_cast<int>(matches(f).size());
+  s.correlation_ms = 1e3 * correlation_s_;
+  s.total_ms = elapsedMilliseconds();
+  if (result.hypotheses.empty() && !result.match_of_feature.empty())
+    result.hypotheses.push_back({0, -1, 1.0, result.match_of_feature});
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,152 @@
+#include "active_matching_slam/ros/image_conversions.h"
+
+#include <cv_bridge/cv_bridge.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <boost/make_shared.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+namespace active_matching_slam {
+namespace {
+
+namespace encodings = sensor_msgs::image_encodings;
+
+constexpr std::uint32_t kLargestSide_px = 32767;
+
+/// Drivers that leave the colour space open mean grey or OpenCV's order.
+std::string colorEncoding(const std::string& encoding) {
+  if (encoding == encodings::TYPE_8UC1) return encodings::MONO8;
+  if (encoding == encodings::TYPE_8UC3) return encodings::BGR8;
+  if (encoding == encodings::TYPE_8UC4) return encodings::BGRA8;
+  if (encoding == encodings::TYPE_16UC1) return encodings::MONO16;
+  return encoding;
+}
+
+std::string sizeName(std::uint64_t width, std::uint64_t height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
+/// Checks what cv_bridge takes on trust in some of its versions.
+void checkLayout(const sensor_msgs::Image& message) {
+  if (message.width == 0 || message.height == 0)
+    throw std::runtime_error("image is empty: " + sizeName(message.width, message.height));
+  int bytes_per_pixel = 0;
+  try {
+    bytes_per_pixel =
+        encodings::numChannels(message.encoding) * encodings::bitDepth(message.encoding) / 8;
+  } catch (const std::exception&) {
+    throw std::runtime_error("image encoding '" + message.encoding + "' is unknown");
+  }
+  const std::uint64_t row_bytes = std::uint64_t{message.width} * bytes_per_pixel;
+  if (message.step < row_bytes)
+    throw std::runtime_error("image step is " + std::to_string(message.step) + ", a row of " +
+                             std::to_string(message.width) + " pixels '" + message.encoding +
+                             "' has " + std::to_string(row_bytes) + " bytes");
+  const std::uint64_t total = std::uint64_t{message.step} * message.height;
+  if (message.data.size() != total)
+    throw std::runtime_error("image data has " + std::to_string(message.data.size()) +
+                             " bytes, step x height is " + std::to_string(total));
+}
+
+std::vector<double> knownCoefficients(const sensor_msgs::CameraInfo& message,
+                                      DistortionModel model) {
+  std::size_t known = 0;
+  switch (model) {
+    case DistortionModel::kNone:
+      known = 0;
+      break;
+    case DistortionModel::kPlumbBob:
+      known = 5;
+      break;
+    case DistortionModel::kRationalPolynomial:
+      known = 8;
+      break;
+    case DistortionModel::kEquidistant:
+      known = 4;
+      break;
+  }
+  const auto isZero = [](double d) { return d == 0.0; };
+  if (message.D.size() > known && !std::all_of(message.D.begin() + known, message.D.end(), isZero))
+    throw std::invalid_argument("camera_info.D has " + std::to_string(message.D.size()) +
+                                " coefficients, distortion model '" + message.distortion_model +
+                                "' has " + std::to_string(known));
+  return {message.D.begin(), message.D.begin() + std::min(known, message.D.size())};
+}
+
+}  // namespace
+
+cv::Mat toGrayImage(const sensor_msgs::Image& message) {
+  checkLayout(message);
+  if (message.width == 0 || message.height == 0) throw std::runtime_error("the image is empty");
+  try {
+    sensor_msgs::ImageConstPtr source(&message, [](const sensor_msgs::Image*) {});
+    if (const std::string encoding = colorEncoding(message.encoding);
+        encoding != message.encoding) {
+      auto renamed = boost::make_shared<sensor_msgs::Image>(message);
+      renamed->encoding = encoding;
+      source = renamed;
+    }
+    const cv::Mat gray = cv_bridge::toCvCopy(source, encodings::MONO8)->image;
+    if (gray.type() != CV_8UC1) throw std::runtime_error("it has no conversion to grey");
+    return gray;
+  } catch (const std::exception& error) {
+    throw std::runtime_error("image with encoding '" + message.encoding +
+                             "' can't be made grey: " + error.what());
+  }
+}
+
+cv::Mat toGrayImage(const sensor_msgs::CompressedImage& message) {
+  cv::Mat gray;
+  try {
+    if (!message.data.empty()) gray = cv::imdecode(message.data, cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {
+    gray.release();
+  }
+  if (gray.empty())
+    throw std::runtime_error("compressed image with format '" + message.format + "' and " +
+                             std::to_string(message.data.size()) + " bytes can't be decoded");
+  return gray;
+}
+
+CameraCalibration toCalibration(const sensor_msgs::CameraInfo& message) {
+  if (message.K[0] == 0.0)
+    throw std::invalid_argument(
+        "the camera is uncalibrated: camera_info.K[0] is 0 (calibrate it, or set camera_info_url)");
+  const auto& roi = message.roi;
+  if (std::max(message.width, message.height) > kLargestSide_px)
+    throw std::invalid_argument("camera_info speaks of an image of " +
+                                sizeName(message.width, message.height) + " pixels");
+  if (roi.width > 0 && (std::uint64_t{roi.x_offset} + roi.width > message.width ||
+                        std::uint64_t{roi.y_offset} + roi.height > message.height))
+    throw std::invalid_argument("camera_info.roi " + sizeName(roi.width, roi.height) + "+" +
+                                std::to_string(roi.x_offset) + "+" + std::to_string(roi.y_offset) +
+                                " leaves the image " + sizeName(message.width, message.height));
+  const double binning_x = std::max(1u, message.binning_x);
+  const double binning_y = std::max(1u, message.binning_y);
+
+  CameraCalibration calibration;
+  calibration.name = message.header.frame_id;
+  calibration.width = static_cast<int>((roi.width ? roi.width : message.width) / binning_x);
+  calibration.height = static_cast<int>((roi.height ? roi.height : message.height) / binning_y);
+  calibration.fx = message.K[0] / binning_x;
+  calibration.fy = message.K[4] / binning_y;
+  calibration.cx = (message.K[2] - roi.x_offset) / binning_x;
+  calibration.cy = (message.K[5] - roi.y_offset) / binning_y;
+  calibration.distortion_model = distortionModelFromName(message.distortion_model);
+  calibration.distortion = knownCoefficients(message, calibration.distortion_model);
+  checkCalibration(calibration);
+  return calibration;
+}
+
+bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
+  return a.width == b.width && a.height == b.height && a.K == b.K && a.D == b.D &&
+         a.distortion_model == b.distortion_model && a.binning_x == b.binning_x &&
+         a.binning_y == b.binning_y && a.roi.x_offset == b.roi.x_offset &&
+         a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&
+         a.roi.height == b.roi.height;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,14 @@
+#include "active_matching_slam/ros/tracker_ros.h"
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "active_matching_slam");
+  const ros::NodeHandle node, private_node("~");
+  try {
+    active_matching_slam::TrackerRos tracker(node, private_node);
+    ros::spin();
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM(error.what());
+    return 2;
+  }
+  return 0;
+}

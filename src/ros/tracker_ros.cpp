@@ -1,0 +1,258 @@
+#include "active_matching_slam/ros/tracker_ros.h"
+
+#include <XmlRpcValue.h>
+
+#include <functional>
+#include <stdexcept>
+
+#include "active_matching_slam/ros/bound_options.h"
+
+namespace active_matching_slam {
+NodeSettings readNodeSettings(const ros::NodeHandle& private_node) {
+  NodeSettings settings;
+  XmlRpc::XmlRpcValue tree;
+  private_node.getParam(private_node.getNamespace(), tree);
+  readParameterTree(bindOptions(&settings.tracker, &settings.node), tree,
+                    private_node.getNamespace() + "/");
+  if (!settings.node.known_target.empty())
+    settings.tracker.known_points = readKnownPointsYaml(settings.node.known_target);
+  checkTrackerOptions(settings.tracker);
+  checkNodeOptions(settings.node);
+  return settings;
+}
+
+TrackerRos::TrackerRos(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
+    : private_node_(private_node),
+      settings_(readNodeSettings(private_node)),
+      data_directory_(settings_.node.data_directory),
+      diagnostics_(node, private_node),
+      options_(settings_.node),
+      session_(settings_.tracker),
+      publisher_(private_node, settings_.node),
+      broadcaster_(settings_.node),
+      trajectory_(settings_.node.trajectory_length) {
+  worker_ = std::make_unique<FrameWorker<CameraImage>>(
+      [this](const CameraImage& image) { process(image); });
+  subscription_ = std::make_unique<CameraSubscription>(node, options_.camera_info_url,
+                                                       options_.no_image_timeout_s);
+  subscription_->start(options_.image_transport,
+                       [this](const CameraImage& image) { worker_->post(image); });
+  diagnostics_.start([this] {
+    return NodeDiagnostics::Images{subscription_->received(), worker_->dropped(),
+                                   subscription_->silence(), subscription_->imageTopic()};
+  });
+  reconfigure_ = std::make_unique<ReconfigureServer>(
+      private_node_, [this] { return bindOptions(&settings_.tracker, &settings_.node); },
+      [this](const std::vector<ReconfigureServer::Change>& changes) {
+        return applyChanges(changes);
+      });
+  advertiseServices();
+  const std::string scale =
+      settings_.tracker.known_points.empty()
+          ? "scale is free: lengths are in map units until ~set_scale, or start from a known_target"
+          : "scale comes from " + settings_.node.known_target;
+  ROS_INFO_STREAM("Tracking images of " << subscription_->imageTopic() << " with "
+                                        << subscription_->infoTopic() << "; " << scale);
+}
+
+TrackerRos::~TrackerRos() {
+  services_.clear();
+  reconfigure_.reset();
+  subscription_.reset();
+  worker_->stop();
+}
+
+void TrackerRos::process(const CameraImage& image) noexcept {
+  try {
+    track(image);
+  } catch (const std::exception& error) {
+    diagnostics_.recordFault(error.what());
+    warning_.say(subscription_->imageTopic() + ": " + error.what());
+  }
+}
+
+void TrackerRos::track(const CameraImage& image) {
+  session_.setDemand(publisher_.wantsTrace(), publisher_.wantsStructure());
+  const auto frame = session_.process(image);
+  if (!session_.fault().empty()) {
+    diagnostics_.recordFault(session_.fault());
+    // That camera_info is missing the subscription says itself.
+    if (image.info) warning_.say(subscription_->imageTopic() + ": " + session_.fault());
+  }
+  if (!frame) return;
+  noticeChanges(*frame, image.header().stamp);
+  publisher_.publishState(*frame, image.header().stamp);
+  if (!session_.fault().empty()) return;
+  publish(*frame, image);
+  diagnostics_.record(*frame, (ros::Time::now() - image.header().stamp).toSec(),
+                      (ros::WallTime::now() - image.received).toSec());
+}
+
+void TrackerRos::publish(const TrackedFrame& frame, const CameraImage& image) {
+  FrameContext context;
+  context.stamp = image.header().stamp;
+  context.camera_frame = cameraFrame(image.header());
+  context.body_frame = options_.base_frame.empty() ? context.camera_frame : options_.base_frame;
+  context.dropped_images = worker_->dropped();
+  if (frame.state == TrackingState::kTracking) {
+    trajectory_.add(frame);
+    context.camera =
+        rigidBodyState(frame.camera, frame.camera_covariance, Eigen::Isometry3d::Identity());
+    const auto T_camera_base = broadcaster_.cameraFromBase(context.camera_frame, context.stamp);
+    if (T_camera_base) {
+      context.body = rigidBodyState(frame.camera, frame.camera_covariance, *T_camera_base);
+      broadcaster_.send(frame, context.camera_frame, context.stamp, *T_camera_base);
+    }
+  }
+  publisher_.publish(frame, context, session_.calibration(), trajectory_);
+}
+
+void TrackerRos::noticeChanges(const TrackedFrame& frame, const ros::Time& stamp) {
+  const bool time_jumped = frame.stamp_s < last_stamp_s_;
+  if (session_.generation() != generation_ || frame.resets != resets_) {
+    if (time_jumped)
+      ROS_WARN_STREAM("Time ran back by " << last_stamp_s_ - frame.stamp_s
+                                          << " s (a looped bag?): started anew");
+    else if (session_.generation() == generation_ && reset_cause_.empty())
+      ROS_WARN_STREAM("Started anew" << (frame.reason.empty() ? "" : ": " + frame.reason));
+    forgetPast(time_jumped);
+  }
+  generation_ = session_.generation();
+  resets_ = frame.resets;
+  reset_cause_.clear();
+  last_stamp_s_ = stamp.toSec();
+  if (frame.state == state_) return;
+  state_ = frame.state;
+  const std::string because = frame.reason.empty() ? "" : ": " + frame.reason;
+  if (state_ == TrackingState::kTracking)
+    ROS_INFO_STREAM("Tracking; scale: " << scaleSourceName(frame.scale_source));
+  else
+    ROS_WARN_STREAM("State: " << trackingStateName(state_) << because);
+}
+
+void TrackerRos::forgetPast(bool time_jumped) {
+  trajectory_.clear();
+  publisher_.restart();
+  broadcaster_.reset(time_jumped);
+}
+
+std::string TrackerRos::cameraFrame(const std_msgs::Header& header) const {
+  if (!options_.camera_frame.empty()) return options_.camera_frame;
+  std::string frame = header.frame_id;
+  if (!frame.empty() && frame.front() == '/') frame.erase(0, 1);
+  if (!frame.empty() && frame != options_.world_frame) return frame;
+  ROS_WARN_STREAM_ONCE("The images' frame_id '" << header.frame_id
+                                                << "' can't name the camera: using 'camera' (set "
+                                                   "camera_frame)");
+  return "camera";
+}
+
+void TrackerRos::advertiseServices() {
+  services_ = {
+      private_node_.advertiseService("reset", &TrackerRos::onReset, this),
+      private_node_.advertiseService("save_map", &TrackerRos::onSaveMap, this),
+      private_node_.advertiseService("load_map", &TrackerRos::onLoadMap, this),
+      private_node_.advertiseService("save_trajectory", &TrackerRos::onSaveTrajectory, this),
+      private_node_.advertiseService("set_scale", &TrackerRos::onSetScale, this),
+      private_node_.advertiseService("set_matcher", &TrackerRos::onSetMatcher, this)};
+}
+
+std::string TrackerRos::applyChanges(const std::vector<ReconfigureServer::Change>& changes) {
+  NodeSettings next = settings_;
+  const std::vector<BoundOption> options = bindOptions(&next.tracker, &next.node);
+  std::string error;
+  try {
+    for (const auto& change : changes)
+      for (const BoundOption& option : options)
+        if (option.name() == change.name) option.set(change.value);
+    checkNodeOptions(next.node);
+    worker_->call([&] {
+      session_.setOptions(next.tracker);
+      options_ = next.node;
+      publisher_.setOptions(next.node);
+      broadcaster_.setOptions(next.node);
+    });
+  } catch (const std::exception& fault) {
+    return fault.what();
+  }
+  settings_ = next;
+  subscription_->setSilenceTimeout(next.node.no_image_timeout_s);
+  return error;
+}
+
+template <class Response>
+bool TrackerRos::answer(Response& response, const std::function<void()>& task) {
+  try {
+    response.success = worker_->call(task);
+    if (!response.success) response.message = "the tracker is shutting down";
+  } catch (const std::exception& error) {
+    response.success = false;
+    response.message = error.what();
+    ROS_WARN_STREAM("Refused: " << error.what());
+  }
+  return true;
+}
+
+bool TrackerRos::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  return answer(response, [&] {
+    reset_cause_ = "asked for by ~reset";
+    session_.reset(reset_cause_);
+    forgetPast(false);
+    response.message = "the next image starts anew";
+  });
+}
+
+bool TrackerRos::onSaveMap(ams_msgs::SaveMap::Request& request,
+                           ams_msgs::SaveMap::Response& response) {
+  return answer(response, [&] {
+    const std::string path = data_directory_.resolve(request.name);
+    data_directory_.create();
+    session_.requireTracker().saveMap(path);
+    response.message = path;
+  });
+}
+
+bool TrackerRos::onLoadMap(ams_msgs::LoadMap::Request& request,
+                           ams_msgs::LoadMap::Response& response) {
+  return answer(response, [&] {
+    const std::string path = data_directory_.resolve(request.name);
+    session_.requireTracker().loadMap(path);
+    reset_cause_ = "a map was loaded";
+    forgetPast(false);
+    response.message = path;
+  });
+}
+
+bool TrackerRos::onSaveTrajectory(ams_msgs::SaveTrajectory::Request& request,
+                                  ams_msgs::SaveTrajectory::Response& response) {
+  return answer(response, [&] {
+    const std::string path = data_directory_.resolve(request.name);
+    data_directory_.create();
+    trajectory_.save(path);
+    response.poses = trajectory_.size();
+    response.message = path;
+  });
+}
+
+bool TrackerRos::onSetScale(ams_msgs::SetScale::Request& request,
+                            ams_msgs::SetScale::Response& response) {
+  return answer(response, [&] {
+    session_.requireTracker().setScale(request.factor);
+    trajectory_.rescale(request.factor);
+    response.message = "all lengths were multiplied by " + std::to_string(request.factor);
+  });
+}
+
+bool TrackerRos::onSetMatcher(ams_msgs::SetMatcher::Request& request,
+                              ams_msgs::SetMatcher::Response& response) {
+  const std::string error = applyChanges({{"matcher", request.name}});
+  response.success = error.empty();
+  response.message = error.empty() ? request.name : error;
+  if (error.empty())
+    reconfigure_->publishUpdate();
+  else
+    ROS_WARN_STREAM("Refused: " << error);
+  return true;
+}
+
+}  // namespace active_matching_slam

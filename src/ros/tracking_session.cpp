@@ -1,0 +1,93 @@
+#include "active_matching_slam/ros/tracking_session.h"
+
+#include <stdexcept>
+
+#include "active_matching_slam/camera/camera_model.h"
+#include "active_matching_slam/ros/image_conversions.h"
+
+namespace active_matching_slam {
+
+TrackingSession::TrackingSession(const TrackerOptions& options) : options_(options) {
+  checkTrackerOptions(options_);
+}
+
+TrackerOptions TrackingSession::demandedOptions() const {
+  TrackerOptions options = options_;
+  options.matching.keep_trace = options_.matching.keep_trace || trace_demanded_;
+  options.structure = options_.structure || structure_demanded_;
+  return options;
+}
+
+bool TrackingSession::updateCamera(const CameraImage& image) {
+  if (!image.info) {
+    fault_ = "waiting for camera_info";
+    return false;
+  }
+  if (image.info != info_) {
+    info_ = image.info;
+    const bool changed = tracker_ != nullptr;
+    tracker_.reset();
+    calibration_fault_.clear();
+    try {
+      calibration_ = toCalibration(*info_);
+      tracker_ = std::make_unique<Tracker>(CameraModel(calibration_), demandedOptions());
+      ++generation_;
+      if (changed) ROS_WARN("camera_info has changed: started anew with an empty map");
+    } catch (const std::exception& error) {
+      calibration_fault_ = error.what();
+    }
+  }
+  if (!tracker_) fault_ = calibration_fault_;
+  return tracker_ != nullptr;
+}
+
+std::shared_ptr<const TrackedFrame> TrackingSession::process(const CameraImage& image) {
+  fault_.clear();
+  if (!updateCamera(image)) return nullptr;
+  if (image.header().stamp.isZero()) {
+    fault_ = "image without a stamp: ignored";
+    return nullptr;
+  }
+  try {
+    const auto frame = tracker_->track(image.toGray(), image.header().stamp.toSec());
+    if (frame->image.empty()) fault_ = frame->reason;
+    return frame;
+  } catch (const std::runtime_error& error) {
+    fault_ = error.what();
+  } catch (const std::exception& error) {
+    fault_ = std::string("image ignored: ") + error.what();
+  }
+  return nullptr;
+}
+
+Tracker& TrackingSession::requireTracker() {
+  if (!tracker_)
+    throw std::runtime_error("there is no map yet: " +
+                             (fault_.empty() ? std::string("no image has arrived") : fault_));
+  return *tracker_;
+}
+
+void TrackingSession::reset(const std::string& reason) {
+  if (tracker_) tracker_->reset(reason);
+}
+
+void TrackingSession::setOptions(const TrackerOptions& options) {
+  checkTrackerOptions(options);
+  const TrackerOptions before = options_;
+  options_ = options;
+  try {
+    if (tracker_) tracker_->setOptions(demandedOptions());
+  } catch (const std::exception&) {
+    options_ = before;
+    throw;
+  }
+}
+
+void TrackingSession::setDemand(bool trace, bool structure) {
+  if (trace == trace_demanded_ && structure == structure_demanded_) return;
+  trace_demanded_ = trace;
+  structure_demanded_ = structure;
+  if (tracker_) tracker_->setOptions(demandedOptions());
+}
+
+}  // namespace active_matching_slam

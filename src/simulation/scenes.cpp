@@ -1,0 +1,33 @@
+#include "active_matching_slam/simulation/scenes.h"
+
+#include "scene_builder.h"
+
+namespace active_matching_slam {
+
+const std::vector<NamedChoice>& sceneChoices() {
+  static const std::vector<NamedChoice> choices = {
+      {"room", "a furnished room: desk, bookcase, pictures, carpet, boxes"},
+      {"office", "a larger office: four desks, partitions, bookcases, pillar, windows"},
+      {"walkway", "outdoors: paving, colonnade, facade and a far background"},
+      {"desk", "a desk top seen closely"},
+      {"checkerboard", "a checkerboard on the floor: the same corner over and over"},
+      {"two_depths", "a table with boxes in front of a wall far behind"},
+      {"corridor", "two long walls with posters and doors"},
+      {"wall", "one long wall, for moving sideways"},
+  };
+  return choices;
+}
+
+Scene createScene(const std::string& name, std::uint64_t seed) {
+  checkChoice("scene", name, sceneChoices());
+  if (name == "room") return makeRoom(seed);
+  if (name == "office") return makeOffice(seed);
+  if (name == "walkway") return makeWalkway(seed);
+  if (name == "desk") return makeDesk(seed);
+  if (name == "checkerboard") return makeCheckerboard(seed);
+  if (name == "two_depths") return makeTwoDepths(seed);
+  if (name == "corridor") return makeCorridor(seed);
+  return makeWall(seed);
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,161 @@
+#include "bag_image_source.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+
+#include <fstream>
+#include <set>
+#include <stdexcept>
+
+#include "active_matching_slam/ros/image_conversions.h"
+
+namespace active_matching_slam {
+namespace {
+
+const std::string kCompressed = "/compressed";
+
+bool endsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+std::set<std::string> imageTopics(const rosbag::Bag& bag) {
+  std::set<std::string> topics;
+  rosbag::View view(bag);
+  for (const rosbag::ConnectionInfo* connection : view.getConnections())
+    if (connection->datatype == "sensor_msgs/Image" ||
+        connection->datatype == "sensor_msgs/CompressedImage")
+      topics.insert(connection->topic);
+  return topics;
+}
+
+std::string findImageTopic(const rosbag::Bag& bag, const std::string& wanted) {
+  const std::set<std::string> topics = imageTopics(bag);
+  for (const std::string& topic : {wanted, wanted + kCompressed})
+    if (topics.count(topic)) return topic;
+  std::string list;
+  for (const std::string& topic : topics) list += (list.empty() ? "" : ", ") + topic;
+  throw std::runtime_error(
+      bag.getFileName() + ": no images on " + wanted + "; " +
+      (list.empty() ? "the bag has no image topic" : "image topics there: " + list));
+}
+
+double stampOf(const std_msgs::Header& header, const ros::Time& recorded) {
+  return (header.stamp.isZero() ? recorded : header.stamp).toSec();
+}
+
+/// Runs `read`; what rosbag throws about a damaged file then names the file.
+template <typename F>
+auto reading(const rosbag::Bag& bag, F read) -> decltype(read()) {
+  try {
+    return read();
+  } catch (const ros::Exception& error) {  // rosbag's and ros::serialization's
+    throw std::runtime_error(bag.getFileName() + ": damaged: " + error.what());
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<rosbag::Bag> openBag(const std::string& path) {
+  if (!std::ifstream(path)) throw std::runtime_error(path + ": cannot be opened");
+  auto bag = std::make_unique<rosbag::Bag>();
+  try {
+    bag->open(path, rosbag::bagmode::Read);
+  } catch (const rosbag::BagUnindexedException&) {
+    throw std::runtime_error(path +
+                             ": has no index: still recording, or cut off? ('rosbag reindex')");
+  } catch (const rosbag::BagException& error) {
+    throw std::runtime_error(path + ": not a whole bag: " + error.what());
+  }
+  return bag;
+}
+
+BagImageSource::BagImageSource(const rosbag::Bag& bag, const std::string& topic) : bag_(bag) {
+  reading(bag_, [&] {
+    topic_ = findImageTopic(bag, topic);
+    view_ = std::make_unique<rosbag::View>(bag, rosbag::TopicQuery(topic_));
+    position_ = view_->begin();
+  });
+}
+
+bool BagImageSource::next(cv::Mat* image, double* stamp_s) {
+  return reading(bag_, [&] {
+    if (position_ == view_->end()) return false;
+    const rosbag::MessageInstance& message = *position_;
+    image->release();
+    std_msgs::Header header;
+    try {
+      if (const auto raw = message.instantiate<sensor_msgs::Image>()) {
+        header = raw->header;
+        *image = toGrayImage(*raw);
+      } else if (const auto compressed = message.instantiate<sensor_msgs::CompressedImage>()) {
+        header = compressed->header;
+        *image = toGrayImage(*compressed);
+      }
+    } catch (const ros::Exception&) {  // the bag
+      throw;
+    } catch (const std::runtime_error&) {  // this image only
+    }
+    *stamp_s = stampOf(header, message.getTime());
+    ++position_;
+    return true;
+  });
+}
+
+bool BagImageSource::skip() {
+  return reading(bag_, [&] {
+    if (position_ == view_->end()) return false;
+    ++position_;
+    return true;
+  });
+}
+
+std::string cameraInfoTopicOf(const std::string& image_topic) {
+  std::string topic = image_topic;
+  if (endsWith(topic, kCompressed)) topic.erase(topic.size() - kCompressed.size());
+  const std::size_t slash = topic.rfind('/');
+  return (slash == std::string::npos ? "" : topic.substr(0, slash + 1)) + "camera_info";
+}
+
+CameraCalibration readBagCalibration(const rosbag::Bag& bag, const std::string& topic) {
+  return reading(bag, [&] {
+    rosbag::View view(bag, rosbag::TopicQuery(topic));
+    for (const rosbag::MessageInstance& message : view) {
+      const auto info = message.instantiate<sensor_msgs::CameraInfo>();
+      if (!info) break;
+      try {
+        return toCalibration(*info);
+      } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(bag.getFileName() + ": " + topic + ": " + error.what());
+      }
+    }
+    throw std::runtime_error(bag.getFileName() + ": no sensor_msgs/CameraInfo on " + topic);
+  });
+}
+
+Trajectory readBagTrajectory(const rosbag::Bag& bag, const std::string& topic) {
+  return reading(bag, [&] {
+    Trajectory trajectory;
+    rosbag::View view(bag, rosbag::TopicQuery(topic));
+    for (const rosbag::MessageInstance& message : view) {
+      const auto pose = message.instantiate<geometry_msgs::PoseStamped>();
+      if (!pose) break;
+      StampedPose stamped;
+      stamped.stamp_s = stampOf(pose->header, message.getTime());
+      const auto& q = pose->pose.orientation;
+      const auto& t = pose->pose.position;
+      stamped.T_world_camera.linear() =
+          Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized().toRotationMatrix();
+      stamped.T_world_camera.translation() << t.x, t.y, t.z;
+      trajectory.push_back(stamped);
+    }
+    return trajectory;
+  });
+}
+
+bool bagHasTopic(const rosbag::Bag& bag, const std::string& topic) {
+  return reading(bag, [&] { return rosbag::View(bag, rosbag::TopicQuery(topic)).size() > 0; });
+}
+
+}  // namespace active_matching_slam

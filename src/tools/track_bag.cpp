@@ -1,0 +1,210 @@
+// The tracker on a recorded bag: no master, as fast as it goes, the same result bit for bit.
+
+#include <console_bridge/console.h>
+
+#include <boost/filesystem.hpp>
+#include <boost/program_options.hpp>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <opencv2/videoio.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "active_matching_slam/evaluation/run_report.h"
+#include "active_matching_slam/evaluation/run_sequence.h"
+#include "active_matching_slam/ros/debug_image.h"
+#include "active_matching_slam/tracker/tracker.h"
+#include "camera_bag_writer.h"
+#include "common/bag_image_source.h"
+#include "common/progress_bar.h"
+
+namespace active_matching_slam {
+namespace {
+
+namespace fs = boost::filesystem;
+namespace po = boost::program_options;
+
+constexpr int kFault = 2;
+
+struct Settings {
+  std::string bag, image_topic, camera_info_topic, camera_info, config, known_target, matcher;
+  std::string ground_truth, ground_truth_topic, output;
+  std::vector<std::string> set;
+  int features = 0;
+  RunOptions run;
+  bool ground_truth_topic_given = false, simulated = false, annotate = false;
+};
+
+po::options_description describeOptions(Settings* s) {
+  po::options_description options("track_bag --bag X.bag --output DIR [options]", 100);
+  auto add = options.add_options();
+  const auto text = [](std::string* target) { return po::value(target); };
+  add("help,h", "this text");
+  add("bag", text(&s->bag)->required(), "bag to track");
+  add("output", text(&s->output)->required(),
+      "directory for trajectory.txt, statistics.csv, summary.json and trajectory.png");
+  add("image-topic", text(&s->image_topic)->default_value("/camera/image_raw"),
+      "raw or compressed images");
+  add("camera-info-topic", text(&s->camera_info_topic),
+      "default: camera_info beside the image topic");
+  add("camera-info", text(&s->camera_info), "calibration yaml instead of a topic");
+  add("config", text(&s->config), "yaml with settings, as config/tracker.yaml");
+  add("set", po::value(&s->set)->composing(), "one setting, as in map/maximum_features=80");
+  add("known-target", text(&s->known_target), "yaml with known points: the map becomes metric");
+  add("matcher", text(&s->matcher), "active_search, jcbb, one_point_ransac, active, ...");
+  add("features", po::value(&s->features), "features measured in a frame");
+  add("every", po::value(&s->run.every)->default_value(1), "track only every K-th image");
+  add("max-frames", po::value(&s->run.maximum_frames)->default_value(0),
+      "stop after so many (0: all)");
+  add("ground-truth", text(&s->ground_truth), "true trajectory, TUM text");
+  add("ground-truth-topic", text(&s->ground_truth_topic)->default_value("/ground_truth/pose"),
+      "true poses in the bag (geometry_msgs/PoseStamped)");
+  add("simulated", po::bool_switch(&s->simulated),
+      "the truth is exact: hold errors against the covariance (NEES); implied by a bag of "
+      "simulate_bag");
+  add("annotate", po::bool_switch(&s->annotate),
+      "also write annotated.avi: what was predicted, searched and matched");
+  return options;
+}
+
+TrackerOptions trackerOptionsOf(const Settings& settings) {
+  TrackerOptions options;
+  if (!settings.config.empty()) options = readTrackerOptionsYaml(settings.config);
+  options.structure = true;  // the report shows it, whatever a live node needs
+  if (!settings.known_target.empty())
+    options.known_points = readKnownPointsYaml(settings.known_target);
+  if (!settings.matcher.empty()) options.matcher = settings.matcher;
+  if (settings.features > 0) {
+    options.map.features_per_frame = settings.features;
+    // Room for those out of sight, too.
+    options.map.maximum_features = std::max(options.map.maximum_features, 2 * settings.features);
+  }
+  for (const std::string& assignment : settings.set) setTrackerOption(assignment, &options);
+  // A budget of time would make the result depend on the machine. What it means for the choice of a
+  // matcher, which follows a model of the cost and no clock, stays.
+  if (options.matching.max_milliseconds > 0.0)
+    options.matching.auto_milliseconds = options.matching.max_milliseconds;
+  options.matching.max_milliseconds = 0.0;
+  checkTrackerOptions(options);
+  return options;
+}
+
+RunTruth truthOf(const Settings& settings, const rosbag::Bag& bag) {
+  RunTruth truth;
+  truth.simulated = settings.simulated || bagHasTopic(bag, CameraBagWriter::kSimulationTopic);
+  if (!settings.ground_truth.empty()) {
+    truth.trajectory = readTrajectoryTum(settings.ground_truth);
+    return truth;
+  }
+  truth.trajectory = readBagTrajectory(bag, settings.ground_truth_topic);
+  if (truth.trajectory.empty() && settings.ground_truth_topic_given)
+    throw std::runtime_error(settings.bag + ": no geometry_msgs/PoseStamped on " +
+                             settings.ground_truth_topic);
+  return truth;
+}
+
+/// Motion JPEG, opened at the first picture.
+class AnnotatedVideo {
+ public:
+  explicit AnnotatedVideo(const std::string& path) : path_(path) {}
+  void add(const TrackedFrame& frame) {
+    const cv::Mat picture = drawDebugImage(frame, DrawOptions());
+    if (picture.empty()) return;
+    if (!writer_.isOpened() &&
+        !writer_.open(path_, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30.0, picture.size()))
+      throw std::runtime_error(path_ + ": cannot be written");
+    writer_.write(picture);
+  }
+
+ private:
+  std::string path_;
+  cv::VideoWriter writer_;
+};
+
+void printSummary(const RunSummary& s, const std::string& output) {
+  const auto print = [](const std::string& name, const std::optional<double>& value, double factor,
+                        const char* unit) {
+    if (value) std::printf(", %s %.1f %s", name.c_str(), factor * *value, unit);
+  };
+  std::printf("%d of %d frames tracked, lost %d times", s.frames_tracked, s.frames, s.times_lost);
+  print("ATE Sim(3)", s.ate_sim3_m, 1000.0, "mm");
+  print("ATE SE(3)", s.ate_se3_m, 1000.0, "mm");
+  print("NEES", s.nees_mean, 1.0, "of 6");
+  std::printf(", %.1f of %.1f matched", s.matched_mean, s.candidates_mean);
+  if (!s.durations.empty())
+    std::printf(", %.1f ms a frame (99 %%: %.1f)", s.durations.back().median_ms,
+                s.durations.back().p99_ms);
+  std::printf("\nwritten to %s\n", output.c_str());
+}
+
+void run(const Settings& settings) {
+  const TrackerOptions options = trackerOptionsOf(settings);
+  const std::unique_ptr<rosbag::Bag> bag = openBag(settings.bag);
+  BagImageSource images(*bag, settings.image_topic);
+  const std::string info_topic = settings.camera_info_topic.empty()
+                                     ? cameraInfoTopicOf(images.topic())
+                                     : settings.camera_info_topic;
+  const CameraModel camera(settings.camera_info.empty()
+                               ? readBagCalibration(*bag, info_topic)
+                               : readCalibrationYaml(settings.camera_info));
+  RunReport report;
+  report.setTruth(truthOf(settings, *bag));
+  boost::system::error_code error;
+  fs::create_directories(settings.output, error);
+  if (error) throw std::runtime_error(settings.output + ": " + error.message());
+
+  Tracker tracker(camera, options);
+  std::unique_ptr<AnnotatedVideo> video;
+  if (settings.annotate)
+    video = std::make_unique<AnnotatedVideo>(settings.output + "/annotated.avi");
+  int total = (images.size() + settings.run.every - 1) / std::max(1, settings.run.every);
+  if (settings.run.maximum_frames > 0) total = std::min(total, settings.run.maximum_frames);
+  {
+    ProgressBar progress("track_bag", total);
+    int done = 0;
+    runSequence(&images, &tracker, settings.run, [&](const TrackedFrame& frame) {
+      report.add(frame);
+      if (video) video->add(frame);
+      const MatchStatistics& matching = frame.matching.statistics;
+      progress.advance(++done, trackingStateName(frame.state) + ", " +
+                                   std::to_string(matching.matched) + " of " +
+                                   std::to_string(matching.candidates) + " matched");
+    });
+  }
+  report.write(settings.output);
+  printSummary(report.summary(), settings.output);
+}
+
+int trackBag(int argc, char** argv) {
+  console_bridge::noOutputHandler();  // a fault is one line, and ours
+  Settings settings;
+  const po::options_description options = describeOptions(&settings);
+  try {
+    po::variables_map values;
+    po::store(po::parse_command_line(argc, argv, options), values);
+    if (values.count("help")) {
+      std::cout << options << "\n";
+      return 0;
+    }
+    po::notify(values);
+    settings.ground_truth_topic_given = !values["ground-truth-topic"].defaulted();
+    if (settings.run.every < 1) throw std::runtime_error("--every must be at least 1");
+    if (values.count("features") && settings.features < 1)
+      throw std::runtime_error("--features must be at least 1");
+    run(settings);
+    return 0;
+  } catch (const std::exception& error) {
+    std::string line = error.what();
+    for (char& c : line)
+      if (c == '\n' || c == '\r') c = ' ';
+    std::cerr << "track_bag: " << line << "\n";
+    return kFault;
+  }
+}
+
+}  // namespace
+}  // namespace active_matching_slam
+
+int main(int argc, char** argv) { return active_matching_slam::trackBag(argc, argv); }

@@ -1,0 +1,116 @@
+#include "active_matching_slam/tracker/tracked_frame.h"
+
+#include <algorithm>
+
+#include "tracker_implementation.h"
+
+namespace active_matching_slam {
+
+std::string trackingStateName(TrackingState state) {
+  switch (state) {
+    case TrackingState::kWaiting:
+      return "waiting";
+    case TrackingState::kInitialising:
+      return "initialising";
+    case TrackingState::kTracking:
+      return "tracking";
+    case TrackingState::kLost:
+      return "lost";
+  }
+  return "";
+}
+
+std::string scaleSourceName(ScaleSource source) {
+  switch (source) {
+    case ScaleSource::kFree:
+      return "free";
+    case ScaleSource::kKnownTarget:
+      return "known_target";
+    case ScaleSource::kKnownPoints:
+      return "known_points";
+    case ScaleSource::kService:
+      return "service";
+  }
+  return "";
+}
+
+std::string featureStatusName(FeatureStatus status) {
+  switch (status) {
+    case FeatureStatus::kNotVisible:
+      return "not_visible";
+    case FeatureStatus::kNotSearched:
+      return "not_searched";
+    case FeatureStatus::kMissed:
+      return "missed";
+    case FeatureStatus::kRejected:
+      return "rejected";
+    case FeatureStatus::kMatched:
+      return "matched";
+  }
+  return "";
+}
+
+void Tracker::Implementation::describe(TrackedFrame* frame) const {
+  frame->scale_source = scale_source_;
+  frame->camera = filter_.camera();
+  frame->camera_covariance = filter_.cameraCovariance();
+  frame->retired_total = map_.retiredTotal();
+  frame->resets = resets_;
+  frame->times_lost = times_lost_;
+  for (const MapFeature& feature : map_.features()) {
+    const FeatureState& state = *filter_.find(feature.id);
+    TrackedFeature out;
+    out.id = feature.id;
+    out.kind = state.kind;
+    out.position_world = state.position();
+    out.covariance_world = filter_.positionCovariance(state);
+    out.anchor_world = state.anchor_world;
+    out.bearing_world = state.bearing_world;
+    out.inverse_depth = state.inverse_depth;
+    if (state.kind == FeatureKind::kInverseDepth)
+      out.sigma_inverse_depth = filter_.sigmaInverseDepth(state);
+    out.known = feature.known;
+    out.attempts = feature.attempts;
+    out.successes = feature.successes;
+    out.template_image = feature.patch.image;
+    out.predicted_px.setZero();
+    out.innovation_covariance_px2.setZero();
+    out.matched_px.setZero();
+    frame->features.push_back(out);
+  }
+  if (frame->matching.match_of_feature.empty()) return;
+  std::size_t next = 0;
+  for (int i = 0; i < prior_.size(); ++i) {
+    const bool used = next < fused_.size() && fused_[next].id == prior_.ids[i];
+    const Eigen::Vector2d pixel = used ? fused_[next].pixel : Eigen::Vector2d::Zero();
+    if (used) ++next;
+    const auto it =
+        std::lower_bound(frame->features.begin(), frame->features.end(), prior_.ids[i],
+                         [](const TrackedFeature& f, FeatureId id) { return f.id < id; });
+    if (it == frame->features.end() || it->id != prior_.ids[i]) {
+      frame->candidates.push_back(-1);  // retired at the end of this frame
+      continue;
+    }
+    frame->candidates.push_back(static_cast<int>(it - frame->features.begin()));
+    it->predicted_px = prior_.mean(i);
+    it->innovation_covariance_px2 = prior_.covariance(i);
+    const auto& matches = frame->matches[i];
+    if (used) {
+      it->status = FeatureStatus::kMatched;
+      it->matched_px = pixel;
+      it->score = matches[frame->matching.match_of_feature[i]].score;
+    } else if (!matches.empty()) {
+      const auto best = std::max_element(
+          matches.begin(), matches.end(),
+          [](const SearchMatch& a, const SearchMatch& b) { return a.score < b.score; });
+      it->status = FeatureStatus::kRejected;
+      it->matched_px = best->pixel;
+      it->score = best->score;
+    } else {
+      it->status = search_.searchedPixels(i).size() > 0 ? FeatureStatus::kMissed
+                                                        : FeatureStatus::kNotSearched;
+    }
+  }
+}
+
+}  // namespace active_matching_slam

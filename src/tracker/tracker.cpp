@@ -1,0 +1,152 @@
+#include "active_matching_slam/tracker/tracker.h"
+
+#include <chrono>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "active_matching_slam/image/image_quality.h"
+#include "active_matching_slam/tracker/option_fields.h"
+#include "tracker_implementation.h"
+
+namespace active_matching_slam {
+namespace {
+
+class StopWatch {
+ public:
+  /// Milliseconds since construction or the last call.
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return ms;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+void Tracker::Implementation::reset(const std::string& reason) {
+  state_ = TrackingState::kWaiting;
+  reason_ = reason;
+  map_.clear();
+  structure_.clear();
+  structure_snapshot_ = {};
+  filter_.reset(CameraState(), Eigen::Matrix<double, 12, 12>::Zero());
+  scale_source_ = ScaleSource::kFree;
+  previous_image_.release();
+  poor_frames_ = 0;
+  ++resets_;
+}
+
+void Tracker::Implementation::setOptions(const TrackerOptions& options) {
+  checkTrackerOptions(options);
+  if (options.image.template_size_px != options_.image.template_size_px ||
+      options.image.source_patch_size_px != options_.image.source_patch_size_px)
+    throw std::invalid_argument(
+        "image/template_size_px and image/source_patch_size_px can't change "
+        "while a map is kept");
+  if (options.matcher != options_.matcher) matcher_ = createMatcher(options.matcher);
+  filter_.setOptions(options.filter);
+  relocaliser_ = Relocaliser(camera_, {}, options.map, options.image);
+  search_ = ImageFeatureSearch(options.image);
+  options_ = options;
+}
+
+void Tracker::Implementation::setScale(double factor) {
+  if (!(factor > 0.0) || !std::isfinite(factor))
+    throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
+  filter_.rescale(factor);
+  map_.rescale(factor);
+  scale_source_ = ScaleSource::kService;
+}
+
+/// Refuses what can't be tracked, and says why.
+bool Tracker::Implementation::accept(const cv::Mat& image, double stamp_s, TrackedFrame* frame) {
+  std::ostringstream fault;
+  if (image.empty()) {
+    fault << "the image is empty";
+  } else if (image.type() != CV_8UC1) {
+    fault << "the image is not 8-bit grey";
+  } else if (image.cols != camera_.width() || image.rows != camera_.height()) {
+    fault << "the image is " << image.cols << " x " << image.rows << ", the calibration "
+          << camera_.width() << " x " << camera_.height();
+  } else if (!std::isfinite(stamp_s)) {
+    fault << "the stamp is not a finite number";
+  } else if (state_ != TrackingState::kWaiting && stamp_s < last_stamp_s_) {
+    std::ostringstream reason;
+    reason << "the stamp ran back by " << last_stamp_s_ - stamp_s << " s: started anew";
+    reset(reason.str());
+    frame->reason = reason.str();
+    return true;
+  } else if (state_ != TrackingState::kWaiting && stamp_s == last_stamp_s_) {
+    fault << "the stamp equals the one before";
+  } else {
+    return true;
+  }
+  frame->reason = "image ignored: " + fault.str();
+  return false;
+}
+
+std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat& image,
+                                                                   double stamp_s) {
+  auto frame = std::make_shared<TrackedFrame>();
+  StopWatch total, stage;
+  frame->stamp_s = stamp_s;
+  frame->index = images_++;
+  if (!accept(image, stamp_s, frame.get())) {
+    frame->state = state_;
+    describe(frame.get());
+    return frame;
+  }
+  frame->image = image;
+  frame->repeated_image = !previous_image_.empty() && isRepeatedImage(image, previous_image_);
+  last_stamp_s_ = stamp_s;
+
+  if (state_ == TrackingState::kWaiting || state_ == TrackingState::kInitialising) {
+    start(image, frame.get());
+    state_stamp_s_ = stamp_s;
+  } else if (state_ == TrackingState::kLost) {
+    predict(stamp_s - state_stamp_s_);
+    state_stamp_s_ = stamp_s;
+    relocalise(image, frame.get());
+  } else if (!frame->repeated_image) {
+    predict(stamp_s - state_stamp_s_);
+    state_stamp_s_ = stamp_s;
+    frame->timings_ms.predict = stage.lap();
+    measure(image);
+    frame->timings_ms.measure = stage.lap();
+    match(image, frame.get());
+    frame->timings_ms.match = stage.lap();
+    correct(frame.get());
+    frame->timings_ms.update = stage.lap();
+    judge();
+    maintainMap(image, frame.get());
+    frame->timings_ms.map = stage.lap();
+    if (options_.structure) updateStructure(frame.get());
+    frame->timings_ms.structure = stage.lap();
+  }
+  image.copyTo(previous_image_);  // the caller may use its memory again
+  frame->state = state_;
+  if (!reason_.empty()) frame->reason = reason_;
+  describe(frame.get());
+  frame->timings_ms.total = total.lap();
+  return frame;
+}
+
+Tracker::Tracker(const CameraModel& camera, const TrackerOptions& options)
+    : implementation_(std::make_unique<Implementation>(camera, options)) {}
+Tracker::~Tracker() = default;
+std::shared_ptr<const TrackedFrame> Tracker::track(const cv::Mat& image, double stamp_s) {
+  return implementation_->track(image, stamp_s);
+}
+void Tracker::reset(const std::string& reason) { implementation_->reset(reason); }
+const TrackerOptions& Tracker::options() const { return implementation_->options(); }
+void Tracker::setOptions(const TrackerOptions& options) { implementation_->setOptions(options); }
+void Tracker::setScale(double factor) { implementation_->setScale(factor); }
+void Tracker::saveMap(const std::string& path) const { implementation_->saveMap(path); }
+void Tracker::loadMap(const std::string& path) { implementation_->loadMap(path); }
+
+}  // namespace active_matching_slam

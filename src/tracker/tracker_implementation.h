@@ -1,0 +1,86 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "active_matching_slam/image/image_feature_search.h"
+#include "active_matching_slam/information/map_structure.h"
+#include "active_matching_slam/map/feature_map.h"
+#include "active_matching_slam/map/relocaliser.h"
+#include "active_matching_slam/matching/matcher.h"
+#include "active_matching_slam/tracker/tracker.h"
+
+namespace active_matching_slam {
+
+/// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
+/// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_lost.cpp and
+/// tracked_frame.cpp.
+class Tracker::Implementation {
+ public:
+  Implementation(const CameraModel& camera, const TrackerOptions& options)
+      : camera_(camera),
+        options_(options),
+        filter_(options.filter),
+        search_(options.image),
+        relocaliser_(camera, {}, options.map, options.image),
+        matcher_(createMatcher(options.matcher)),
+        second_matcher_(createMatcher("one_point_ransac")) {
+    checkTrackerOptions(options);
+  }
+
+  std::shared_ptr<const TrackedFrame> track(const cv::Mat& image, double stamp_s);
+  void reset(const std::string& reason);
+  void setOptions(const TrackerOptions& options);
+  void setScale(double factor);
+  void saveMap(const std::string& path) const;
+  void loadMap(const std::string& path);
+
+  const TrackerOptions& options() const { return options_; }
+
+ private:
+  bool accept(const cv::Mat& image, double stamp_s, TrackedFrame* frame);
+  void start(const cv::Mat& image, TrackedFrame* frame);
+  bool startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame);
+  void predict(double interval_s);
+  void measure(const cv::Mat& image);
+  void match(const cv::Mat& image, TrackedFrame* frame);
+  void correct(TrackedFrame* frame);
+  void judge();
+  void lose(const std::string& reason);
+  void relocalise(const cv::Mat& image, TrackedFrame* frame);
+  void maintainMap(const cv::Mat& image, TrackedFrame* frame);
+  void updateStructure(TrackedFrame* frame);
+  int startFeatures(const cv::Mat& image, int wanted, TrackedFrame* frame);
+  void retire(const std::vector<FeatureId>& ids, TrackedFrame* frame);
+  double depthPrior() const;
+  void describe(TrackedFrame* frame) const;
+
+  CameraModel camera_;
+  TrackerOptions options_;
+  Ekf filter_;
+  FeatureMap map_;
+  ImageFeatureSearch search_;
+  Relocaliser relocaliser_;
+  std::unique_ptr<Matcher> matcher_, second_matcher_;
+  MapStructure structure_;
+  MapStructure::Snapshot structure_snapshot_;
+
+  TrackingState state_ = TrackingState::kWaiting;
+  std::string reason_;
+  ScaleSource scale_source_ = ScaleSource::kFree;
+  cv::Mat previous_image_;
+  double last_stamp_s_ = 0.0;   ///< of the last image accepted
+  double state_stamp_s_ = 0.0;  ///< of the filter's state
+  double lost_stamp_s_ = 0.0;   ///< when the camera was lost
+  std::int64_t images_ = 0;
+  int resets_ = 0, times_lost_ = 0, poor_frames_ = 0;
+
+  // The frame in hand.
+  std::vector<VisibleFeature> visible_, candidates_;
+  MeasurementPrior prior_;
+  std::vector<Template> templates_;
+  std::vector<FeatureMeasurement> fused_;
+};
+
+}  // namespace active_matching_slam

@@ -1,0 +1,130 @@
+#include <sstream>
+#include <stdexcept>
+
+#include "active_matching_slam/map/map_file.h"
+#include "tracker_implementation.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr double kFoundSigmaPosition = 0.2;  ///< of a place found again, in scene depths
+constexpr double kFoundSigmaRotation = 0.1;  ///< [rad]
+constexpr int kFramesBetweenLooks = 4;       ///< a look through the whole map takes long
+constexpr int kLeastMap = 10;                ///< a smaller map can't be found again
+
+bool isSameCamera(const CameraCalibration& a, const CameraCalibration& b) {
+  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
+         a.cx == b.cx && a.cy == b.cy && a.distortion_model == b.distortion_model &&
+         a.distortion == b.distortion;
+}
+
+}  // namespace
+
+/// Decides whether the camera is still tracked.
+void Tracker::Implementation::judge() {
+  const int matched = static_cast<int>(fused_.size());
+  if (matched >= options_.minimum_matches) {
+    poor_frames_ = 0;
+    state_ = TrackingState::kTracking;
+    reason_.clear();
+    return;
+  }
+  ++poor_frames_;
+  std::ostringstream reason;
+  reason << matched << " of " << prior_.size() << " features matched, " << options_.minimum_matches
+         << " are needed";
+  reason_ = reason.str();
+  if (poor_frames_ >= options_.lost_after_frames && state_ != TrackingState::kLost) {
+    lose(reason_);
+  }
+}
+
+/// From here on no pose is claimed. The camera is taken to have stopped somewhere near.
+void Tracker::Implementation::lose(const std::string& reason) {
+  state_ = TrackingState::kLost;
+  reason_ = "lost: " + reason;
+  lost_stamp_s_ = last_stamp_s_;
+  poor_frames_ = 0;
+  ++times_lost_;
+  CameraState camera = filter_.camera();
+  camera.velocity_world.setZero();
+  camera.angular_velocity_camera.setZero();
+  filter_.relocateCamera(camera, filter_.cameraCovariance());
+}
+
+/// Looks for the camera in the whole map by one whole image.
+void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
+  const double lost_s = last_stamp_s_ - lost_stamp_s_;
+  if (map_.size() < kLeastMap) {
+    reset("lost with a map of " + std::to_string(map_.size()) + " features: started anew");
+    return;
+  }
+  if (options_.reset_when_lost_after_s > 0.0 && lost_s >= options_.reset_when_lost_after_s) {
+    std::ostringstream reason;
+    reason << "lost for " << lost_s << " s: started anew";
+    reset(reason.str());
+    return;
+  }
+  if (frame->index % kFramesBetweenLooks != 0) return;
+  const auto found = relocaliser_.find(image, filter_, map_);
+  if (!found) return;
+  CameraState camera;
+  camera.position_world = found->T_world_camera.translation();
+  camera.q_world_camera = Eigen::Quaterniond(found->T_world_camera.linear()).normalized();
+  double depth = 0.0;
+  for (const FeatureMeasurement& inlier : found->inliers)
+    depth += (filter_.find(inlier.id)->position() - camera.position_world).norm();
+  depth /= static_cast<double>(found->inliers.size());
+  Eigen::Matrix<double, 12, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(kFoundSigmaPosition * depth),
+      Eigen::Vector3d::Constant(kFoundSigmaRotation),
+      Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
+      Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
+  filter_.relocateCamera(camera, sigma.array().square().matrix().asDiagonal());
+  const UpdateReport report = filter_.update(camera_, found->inliers);
+  frame->nis = report.nis;
+  frame->nis_degrees = 2 * report.used;
+  state_ = TrackingState::kTracking;
+  reason_.clear();
+}
+
+void Tracker::Implementation::saveMap(const std::string& path) const {
+  if (map_.size() == 0) throw std::runtime_error("there is no map to save yet");
+  MapFileContent content;
+  content.camera = camera_.calibration();
+  content.camera_state = filter_.camera();
+  content.features = filter_.features();
+  content.covariance = filter_.covariance();
+  content.map = map_.features();
+  content.next_id = filter_.nextId();
+  content.scale_source = static_cast<int>(scale_source_);
+  content.template_size_px = options_.image.template_size_px;
+  content.source_patch_size_px = options_.image.source_patch_size_px;
+  writeMapFile(path, content);
+}
+
+void Tracker::Implementation::loadMap(const std::string& path) {
+  const MapFileContent content = readMapFile(path);
+  const auto refuse = [&](const std::string& why) {
+    throw std::runtime_error("'" + path + "': " + why);
+  };
+  if (!isSameCamera(content.camera, camera_.calibration()))
+    refuse("the map was made with another camera or calibration");
+  if (content.template_size_px != options_.image.template_size_px ||
+      content.source_patch_size_px != options_.image.source_patch_size_px)
+    refuse("the map was made with another image/template_size_px or image/source_patch_size_px");
+  if (content.scale_source < 0 || content.scale_source > static_cast<int>(ScaleSource::kService))
+    refuse("the source of scale is unknown");
+  filter_.restore(content.camera_state, content.features, content.covariance, content.next_id);
+  map_.clear();
+  for (const MapFeature& feature : content.map) map_.add(feature);
+  scale_source_ = static_cast<ScaleSource>(content.scale_source);
+  structure_.clear();
+  structure_snapshot_ = {};
+  state_ = TrackingState::kLost;
+  reason_ = "map loaded: looking for the camera in it";
+  lost_stamp_s_ = last_stamp_s_;
+  poor_frames_ = 0;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,105 @@
+#include <algorithm>
+
+#include "active_matching_slam/image/corners.h"
+#include "active_matching_slam/image/warp.h"
+#include "tracker_implementation.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr int kMostStartsPerFrame = 12;  ///< after the first image
+/// The structure of a map beyond is made anew every few frames only.
+constexpr int kLargeMap = 120, kLargeMapSnapshotFrames = 5;
+
+}  // namespace
+
+void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedFrame* frame) {
+  if (ids.empty()) return;
+  filter_.removeFeatures(ids);
+  map_.retire(ids);
+  frame->features_retired += static_cast<int>(ids.size());
+}
+
+void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* frame) {
+  frame->features_converted = static_cast<int>(filter_.convertToPoints().size());
+  retire(map_.failing(options_.map), frame);
+  // The maximum may have been lowered.
+  retire(map_.leastInformative(filter_, map_.size() - options_.map.maximum_features), frame);
+  if (poor_frames_ > 0) return;  // where the camera is unsure, nothing new is put on the map
+  visible_ = map_.visible(filter_, camera_, options_.map, options_.image.border_px);
+  const int wanted =
+      options_.map.features_per_frame - static_cast<int>(map_.expectedMatches(visible_));
+  if (wanted <= 0) return;
+  const int excess =
+      map_.size() + std::min(wanted, kMostStartsPerFrame) - options_.map.maximum_features;
+  if (excess > 0) retire(map_.leastInformative(filter_, excess), frame);
+  frame->features_started += startFeatures(image, std::min(wanted, kMostStartsPerFrame), frame);
+}
+
+/// Adds the frame to the graph of mutual information. The tree and the submaps of a large map are
+/// made anew every few frames only.
+void Tracker::Implementation::updateStructure(TrackedFrame* frame) {
+  structure_.addFrame(prior_.ids, prior_.S);
+  std::vector<FeatureId> ids;
+  for (const MapFeature& feature : map_.features()) ids.push_back(feature.id);
+  structure_.keepOnly(ids);
+  const bool is_large = map_.size() > kLargeMap;
+  if (!structure_snapshot_.graph || !is_large || frame->index % kLargeMapSnapshotFrames == 0)
+    structure_snapshot_ = structure_.snapshot();
+  frame->graph = structure_snapshot_.graph;
+  frame->submaps = structure_snapshot_.submaps;
+}
+
+/// Median inverse depth of what is seen now, so that new features say nothing new about scale; the
+/// options' prior while nothing is known.
+double Tracker::Implementation::depthPrior() const {
+  std::vector<double> inverse_depths;
+  const Eigen::Isometry3d T_camera_world = filter_.camera().poseWorldCamera().inverse();
+  for (const VisibleFeature& feature : visible_) {
+    const FeatureState* state = filter_.find(feature.id);
+    if (!state) continue;
+    if (state->kind == FeatureKind::kInverseDepth &&
+        filter_.sigmaInverseDepth(*state) > 0.2 * state->inverse_depth)
+      continue;
+    inverse_depths.push_back(1.0 / (T_camera_world * state->position()).norm());
+  }
+  if (inverse_depths.size() < 5) return options_.filter.initial_inverse_depth;
+  const auto middle =
+      inverse_depths.begin() + static_cast<std::ptrdiff_t>(inverse_depths.size() / 2);
+  std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
+  return *middle;
+}
+
+int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, TrackedFrame* frame) {
+  wanted = std::min(wanted, options_.map.maximum_features - map_.size());
+  if (wanted <= 0) return 0;
+  std::vector<Eigen::Vector2d> occupied;
+  for (const MapFeature& feature : map_.features()) {
+    const FeatureState* state = filter_.find(feature.id);
+    const Eigen::Vector4d point = homogeneousPosition(*state);
+    const Eigen::Isometry3d T_camera_world = filter_.camera().poseWorldCamera().inverse();
+    const auto pixel = camera_.project(T_camera_world.linear() * point.head<3>() +
+                                       point.w() * T_camera_world.translation());
+    if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
+  }
+  const double inverse_depth = depthPrior();
+  const double sigma = inverse_depth * options_.filter.initial_sigma_inverse_depth /
+                       options_.filter.initial_inverse_depth;
+  int started = 0;
+  for (const Corner& corner :
+       detectCorners(image, occupied, wanted, options_.map.minimum_distance_px, options_.image)) {
+    auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
+                                    options_.image.source_patch_size_px);
+    if (!patch) continue;
+    MapFeature feature;
+    feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth, sigma);
+    if (feature.id < 0) continue;
+    feature.patch = std::move(*patch);
+    feature.first_frame = feature.last_matched_frame = frame->index;
+    map_.add(std::move(feature));
+    ++started;
+  }
+  return started;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,119 @@
+#include <algorithm>
+
+#include "active_matching_slam/image/warp.h"
+#include "active_matching_slam/tracker/innovation_check.h"
+#include "tracker_implementation.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr double kPoorShare = 0.6;       ///< of the matches expected: ask twice below
+constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
+
+}  // namespace
+
+void Tracker::Implementation::predict(double interval_s) {
+  filter_.predict(std::min(interval_s, options_.max_frame_interval_s));
+}
+
+/// Predicts what should be seen and prepares the search for it.
+void Tracker::Implementation::measure(const cv::Mat& image) {
+  visible_ = map_.visible(filter_, camera_, options_.map, options_.image.border_px);
+  const auto chosen = map_.choose(visible_, camera_, options_.map.features_per_frame);
+  candidates_.clear();
+  templates_.clear();
+  std::vector<FeatureId> ids;
+  for (const VisibleFeature& feature : chosen) {
+    Template expected;
+    if (!warpTemplate(map_.find(feature.id)->patch, feature.view, options_.image.template_size_px,
+                      &expected) ||
+        expected.contrast() < options_.image.minimum_contrast)
+      continue;
+    candidates_.push_back(feature);
+    templates_.push_back(expected);
+    ids.push_back(feature.id);
+  }
+  PredictedMeasurements predicted = filter_.predictMeasurements(camera_, ids);
+  prior_.ids = std::move(predicted.ids);
+  prior_.z = std::move(predicted.z);
+  prior_.S = std::move(predicted.S);
+  prior_.noise_variance_px2 = options_.filter.sigma_px * options_.filter.sigma_px;
+  if (prior_.ids.size() != ids.size()) {  // some did not project after all
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < ids.size() && kept < prior_.ids.size(); ++i) {
+      if (ids[i] != prior_.ids[kept]) continue;
+      candidates_[kept] = candidates_[i];
+      templates_[kept++] = templates_[i];
+    }
+    candidates_.resize(kept);
+    templates_.resize(kept);
+  }
+  prior_.rates.clear();
+  if (options_.learn_rates)
+    for (const FeatureId id : prior_.ids)
+      prior_.rates.push_back(map_.find(id)->rates.rates({options_.matching.default_rates}));
+  search_.beginFrame(image, templates_);
+}
+
+/// Asks the matcher. A sequential matcher that follows something that moves by itself (a hand, a
+/// door) first, can end up with that and little else: when far fewer features matched than should
+/// have, RANSAC, which sees all matches at once, is asked too, and the larger consensus counts.
+void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
+  frame->matching = matcher_->match(prior_, search_, options_.matching);
+  if (!options_.second_opinion) return;
+  const double expected = map_.expectedMatches(candidates_);
+  const int matched = frame->matching.statistics.matched;
+  if (expected < 8.0 || matched > kPoorShare * expected) return;
+  search_.beginFrame(image, templates_);
+  MatchResult second = second_matcher_->match(prior_, search_, options_.matching);
+  second.statistics.pixels_searched += frame->matching.statistics.pixels_searched;
+  second.statistics.total_ms += frame->matching.statistics.total_ms;
+  if (second.statistics.matched >= matched) {
+    frame->matching = std::move(second);
+    return;
+  }
+  search_.beginFrame(image, templates_);  // match indices belong to the search that found them
+  frame->matching = matcher_->match(prior_, search_, options_.matching);
+}
+
+/// Fuses the accepted matches.
+void Tracker::Implementation::correct(TrackedFrame* frame) {
+  fused_.clear();
+  std::vector<int> matched;
+  const int n = prior_.size();
+  for (int i = 0; i < n; ++i) {
+    frame->matches.push_back(search_.matches(i));
+    if (frame->matching.match_of_feature[i] >= 0) matched.push_back(i);
+  }
+  const int m = static_cast<int>(matched.size());
+  Eigen::VectorXd innovation(2 * m);
+  Eigen::MatrixXd S(2 * m, 2 * m);
+  for (int a = 0; a < m; ++a) {
+    const SearchMatch& match =
+        search_.matches(matched[a])[frame->matching.match_of_feature[matched[a]]];
+    innovation.segment<2>(2 * a) = match.pixel - prior_.mean(matched[a]);
+    for (int b = 0; b < m; ++b)
+      S.block<2, 2>(2 * a, 2 * b) = prior_.S.block<2, 2>(2 * matched[a], 2 * matched[b]);
+  }
+  for (int k : agreeingMeasurements(innovation, S, kAgreementChi2))
+    fused_.push_back(
+        {prior_.ids[matched[k]], prior_.mean(matched[k]) + innovation.segment<2>(2 * k), 0.0});
+
+  const UpdateReport report = filter_.update(camera_, fused_);
+  frame->nis = report.nis;
+  frame->nis_degrees = 2 * report.used;
+
+  std::vector<SearchRecord> records;
+  std::size_t next = 0;
+  for (int i = 0; i < n; ++i) {
+    const bool used = next < fused_.size() && fused_[next].id == prior_.ids[i];
+    if (used) ++next;
+    const std::int64_t pixels = search_.searchedPixels(i).size();
+    if (used || pixels > 0)
+      records.push_back(
+          {prior_.ids[i], used, static_cast<std::int64_t>(search_.matches(i).size()), pixels});
+  }
+  map_.record(records, frame->index);
+}
+
+}  // namespace active_matching_slam

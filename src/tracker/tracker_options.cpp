@@ -1,0 +1,194 @@
+#include "active_matching_slam/tracker/tracker_options.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include "active_matching_slam/matching/matcher.h"
+#include "active_matching_slam/tracker/option_fields.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Throws for every number outside its closed range (NaN included).
+struct RangeCheck {
+  template <class T>
+  void operator()(const OptionField& field, const T& value, T minimum, T maximum) const {
+    if (value >= minimum && value <= maximum) return;
+    std::ostringstream message;
+    message << field.name << " = " << value << " is out of range [" << minimum << ", " << maximum
+            << "]";
+    throw std::invalid_argument(message.str());
+  }
+  template <class T>
+  void operator()(const OptionField&, const T&) const {}
+};
+
+/// Takes what a yaml tree says and remembers which keys are known.
+struct YamlReader {
+  const YAML::Node& root;
+  std::set<std::string>& known;
+
+  YAML::Node find(const std::string& name) const {
+    const auto slash = name.find('/');
+    if (slash == std::string::npos) return root[name];
+    const YAML::Node group = root[name.substr(0, slash)];
+    return group && group.IsMap() ? group[name.substr(slash + 1)]
+                                  : YAML::Node(YAML::NodeType::Undefined);
+  }
+  template <class T>
+  void operator()(const OptionField& field, T& value, T, T) const {
+    (*this)(field, value);
+  }
+  template <class T>
+  void operator()(const OptionField& field, T& value) const {
+    known.insert(field.name);
+    const YAML::Node node = find(field.name);
+    if (!node.IsDefined()) return;
+    try {
+      value = node.as<T>();
+    } catch (const YAML::Exception&) {
+      throw std::invalid_argument(std::string(field.name) + " has a value of the wrong type");
+    }
+  }
+  void operator()(const OptionField& field, UpdateRule& value) const {
+    std::string name = updateRuleName(value);
+    (*this)(field, name);
+    value = updateRuleFromName(name);
+  }
+};
+
+void refuseUnknownKeys(const YAML::Node& node, const std::string& prefix,
+                       const std::set<std::string>& known) {
+  for (const auto& entry : node) {
+    const std::string name = prefix + entry.first.as<std::string>();
+    if (known.count(name)) continue;
+    const bool is_group = std::any_of(known.begin(), known.end(), [&](const std::string& k) {
+      return k.rfind(name + "/", 0) == 0;
+    });
+    if (!is_group || !entry.second.IsMap())
+      throw std::invalid_argument("unknown setting '" + name + "'");
+    refuseUnknownKeys(entry.second, name + "/", known);
+  }
+}
+
+YAML::Node loadYaml(const std::string& path) {
+  try {
+    return YAML::LoadFile(path);
+  } catch (const YAML::BadFile&) {
+    throw std::runtime_error("can't read '" + path + "'");
+  } catch (const YAML::Exception& e) {
+    throw std::runtime_error("'" + path + "' is not valid yaml: " + e.what());
+  }
+}
+
+}  // namespace
+
+std::string updateRuleName(UpdateRule rule) {
+  return rule == UpdateRule::kThesis ? "thesis" : "incremental";
+}
+
+UpdateRule updateRuleFromName(const std::string& name) {
+  if (name == "incremental") return UpdateRule::kIncremental;
+  if (name == "thesis") return UpdateRule::kThesis;
+  throw std::invalid_argument("matching/update_rule = '" + name +
+                              "' is neither incremental nor thesis");
+}
+
+void checkTrackerOptions(const TrackerOptions& options) {
+  visitOptions(options, RangeCheck{});
+  const auto& names = matcherNames();
+  if (std::find(names.begin(), names.end(), options.matcher) == names.end()) {
+    std::string message = "matcher = '" + options.matcher + "' is unknown; there are:";
+    for (const auto& name : names) message += " " + name;
+    throw std::invalid_argument(message);
+  }
+  checkFilterOptions(options.filter);
+  checkImageOptions(options.image);
+  checkMapOptions(options.map);
+  checkMatchOptions(options.matching);
+  if (!options.known_points.empty() && options.known_points.size() < 4)
+    throw std::invalid_argument("known points: " + std::to_string(options.known_points.size()) +
+                                " given, a start needs at least 4");
+}
+
+std::vector<KnownPoint> readKnownPointsYaml(const std::string& path) {
+  const YAML::Node root = loadYaml(path);
+  const auto fail = [&](const std::string& what) {
+    throw std::runtime_error("'" + path + "': " + what);
+  };
+  if (!root.IsMap() || !root["points"] || !root["points"].IsSequence())
+    fail("has no list named points");
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  std::vector<KnownPoint> points;
+  for (const auto& node : root["points"]) {
+    const std::string where = "points[" + std::to_string(points.size()) + "]";
+    KnownPoint point;
+    try {
+      const auto position = node["position_m"].as<std::vector<double>>();
+      const auto pixel = node["image_px"].as<std::vector<double>>();
+      if (position.size() != 3) fail(where + ".position_m needs 3 numbers");
+      if (pixel.size() != 2) fail(where + ".image_px needs 2 numbers");
+      point.position_m = Eigen::Vector3d(position[0], position[1], position[2]);
+      point.image_px = Eigen::Vector2d(pixel[0], pixel[1]);
+    } catch (const YAML::Exception&) {
+      fail(where + " needs position_m: [x, y, z] and image_px: [u, v]");
+    }
+    if (!point.position_m.allFinite() || !point.image_px.allFinite())
+      fail(where + " has a number that is not finite");
+    if (node["template"]) {
+      if (!node["template"].IsScalar()) fail(where + ".template is not the name of a file");
+      const std::string file = (folder / node["template"].as<std::string>()).string();
+      point.template_image = cv::imread(file, cv::IMREAD_GRAYSCALE);
+      if (point.template_image.empty()) fail(where + ".template: can't read image '" + file + "'");
+    }
+    points.push_back(point);
+  }
+  return points;
+}
+
+namespace {
+
+TrackerOptions optionsFromYaml(const YAML::Node& root, const TrackerOptions& defaults) {
+  TrackerOptions options = defaults;
+  std::set<std::string> known;
+  visitOptions(options, YamlReader{root, known});
+  refuseUnknownKeys(root, "", known);
+  checkTrackerOptions(options);
+  return options;
+}
+
+}  // namespace
+
+TrackerOptions readTrackerOptionsYaml(const std::string& path, const TrackerOptions& defaults) {
+  const YAML::Node root = loadYaml(path);
+  if (root.IsNull()) return defaults;
+  if (!root.IsMap()) throw std::runtime_error("'" + path + "' is not a map of settings");
+  try {
+    return optionsFromYaml(root, defaults);
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument("'" + path + "': " + e.what());
+  }
+}
+
+void setTrackerOption(const std::string& assignment, TrackerOptions* options) {
+  const auto equals = assignment.find('=');
+  if (equals == std::string::npos)
+    throw std::invalid_argument("'" + assignment + "' is not of the form name=value");
+  const std::string name = assignment.substr(0, equals), value = assignment.substr(equals + 1);
+  const auto slash = name.find('/');
+  YAML::Node root;
+  if (slash == std::string::npos)
+    root[name] = value;
+  else
+    root[name.substr(0, slash)][name.substr(slash + 1)] = value;
+  *options = optionsFromYaml(root, *options);
+}
+
+}  // namespace active_matching_slam

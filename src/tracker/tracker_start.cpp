@@ -1,0 +1,91 @@
+#include <algorithm>
+#include <cmath>
+
+#include "active_matching_slam/image/image_quality.h"
+#include "active_matching_slam/tracker/known_start.h"
+#include "tracker_implementation.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr double kStartSigmaPosition = 1e-4;  ///< the start defines the world [m]
+constexpr double kStartSigmaRotation = 1e-4;  ///< [rad]
+constexpr double kKnownPointSigma = 5e-4;     ///< how well a known point is known [m]
+constexpr double kScaleSigma = 1e-3;          ///< of the free unit, relative
+
+}  // namespace
+
+void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
+  if (measureImageQuality(image).isBlank()) {
+    state_ = TrackingState::kInitialising;
+    reason_ = "the image is blank: nothing to start from";
+    return;
+  }
+  map_.clear();
+  if (!options_.known_points.empty()) {
+    if (!startFromKnownPoints(image, frame)) return;
+  } else {
+    Eigen::Matrix<double, 12, 1> sigma;
+    sigma << Eigen::Vector3d::Constant(kStartSigmaPosition),
+        Eigen::Vector3d::Constant(kStartSigmaRotation),
+        Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
+        Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
+    filter_.reset(CameraState(), sigma.array().square().matrix().asDiagonal());
+    scale_source_ = ScaleSource::kFree;
+  }
+  visible_.clear();
+  frame->features_started += startFeatures(image, options_.map.features_per_frame, frame);
+  if (options_.known_points.empty()) filter_.fixScale(kScaleSigma);
+  if (map_.size() < std::max(4, options_.minimum_matches)) {
+    state_ = TrackingState::kInitialising;
+    reason_ = "only " + std::to_string(map_.size()) + " corners to start from";
+    return;
+  }
+  state_ = TrackingState::kTracking;
+  reason_.clear();
+  poor_frames_ = 0;
+}
+
+bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame) {
+  const auto found = findKnownStart(image, camera_, options_.known_points,
+                                    options_.known_points_search_px, options_.image, &reason_);
+  if (!found) {
+    state_ = TrackingState::kInitialising;
+    return false;
+  }
+  CameraState camera;
+  camera.position_world = found->T_world_camera.translation();
+  camera.q_world_camera = Eigen::Quaterniond(found->T_world_camera.linear()).normalized();
+  // The pose is linearised at its solution and all but free: the points alone determine it below.
+  const double distance = camera.position_world.norm() + 0.1;
+  Eigen::Matrix<double, 12, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(distance), Eigen::Vector3d::Constant(1.0),
+      Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
+      Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
+  filter_.reset(camera, sigma.array().square().matrix().asDiagonal());
+  std::vector<FeatureMeasurement> measurements;
+  for (std::size_t i = 0; i < options_.known_points.size(); ++i) {
+    MapFeature feature;
+    feature.id =
+        filter_.addPointFeature(options_.known_points[i].position_m,
+                                kKnownPointSigma * kKnownPointSigma * Eigen::Matrix3d::Identity());
+    feature.known = true;
+    feature.first_frame = frame->index;
+    measurements.push_back({feature.id, found->pixels[i], 0.0});
+    const auto patch = extractSourcePatch(image, found->pixels[i], found->T_world_camera,
+                                          options_.image.source_patch_size_px);
+    if (!patch) {
+      reason_ = "known point " + std::to_string(i) + " is too close to the image border";
+      state_ = TrackingState::kInitialising;
+      return false;
+    }
+    feature.patch = *patch;
+    map_.add(std::move(feature));
+  }
+  filter_.update(camera_, measurements);
+  scale_source_ =
+      options_.known_points.size() == 4 ? ScaleSource::kKnownTarget : ScaleSource::kKnownPoints;
+  return true;
+}
+
+}  // namespace active_matching_slam

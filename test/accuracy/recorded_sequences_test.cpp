@@ -1,0 +1,133 @@
+// The default configuration on recordings of real cameras. Errors are of the poses as they were
+// given out at the time, over every frame.
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "support/recorded_sequence.h"
+
+namespace active_matching_slam {
+namespace {
+
+struct TrackedRun {
+  int frames = 0;
+  Trajectory tracked;
+  std::int64_t pixels = 0, pixels_full_gates = 0;
+};
+
+TrackedRun trackAll(const std::string& name, int every, TrackerOptions options, bool known_target) {
+  const std::string folder = recordedDataFolder() + "/" + name;
+  if (known_target) options.known_points = readKnownPointsYaml(folder + "/known_target.yaml");
+  RecordedSequence sequence(folder, every);
+  Tracker tracker(sequence.camera(), options);
+  TrackedRun run;
+  sequence.forEachFrame([&](const cv::Mat& image, double stamp_s) {
+    const auto frame = tracker.track(image, stamp_s);
+    ++run.frames;
+    if (frame->state == TrackingState::kTracking)
+      run.tracked.push_back({stamp_s, frame->camera.poseWorldCamera()});
+    run.pixels += frame->matching.statistics.pixels_searched;
+    run.pixels_full_gates += frame->matching.statistics.pixels_full_gates;
+  });
+  return run;
+}
+
+/// Absolute trajectory error in mm.
+double errorMm(const TrackedRun& run, const std::string& name, AlignmentKind kind) {
+  const std::string truth_file =
+      name == "davison_monoslam_desk" ? "groundtruth_pseudo.txt" : "groundtruth.txt";
+  const auto pairs = pairPoses(
+      run.tracked, readTrajectoryTum(recordedDataFolder() + "/" + name + "/" + truth_file));
+  const auto alignment = align(pairs, kind);
+  return alignment ? 1e3 * absoluteTrajectoryError(pairs, *alignment) : std::nan("");
+}
+
+TrackerOptions withMatcher(const std::string& matcher) {
+  TrackerOptions options;
+  options.matcher = matcher;
+  return options;
+}
+
+class RecordedSequences : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (recordedDataFolder().empty()) GTEST_SKIP() << "skipped: AMS_DATA is not set";
+  }
+};
+
+TEST_F(RecordedSequences, DeskIsTrackedWithoutTarget) {
+  const TrackedRun run = trackAll("davison_monoslam_desk", 1, {}, false);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+  EXPECT_LE(errorMm(run, "davison_monoslam_desk", AlignmentKind::kSimilarity), 15.0);
+}
+
+TEST_F(RecordedSequences, DeskIsTrackedToScaleWithItsTarget) {
+  const TrackedRun run = trackAll("davison_monoslam_desk", 1, {}, true);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+  EXPECT_LE(errorMm(run, "davison_monoslam_desk", AlignmentKind::kRigid), 30.0);
+}
+
+TEST_F(RecordedSequences, CheckerboardIsTrackedThroughRepeatedTexture) {
+  const TrackedRun run = trackAll("uzh_vamr_checkerboard", 1, {}, false);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+  EXPECT_LE(errorMm(run, "uzh_vamr_checkerboard", AlignmentKind::kSimilarity), 4.0);
+}
+
+TEST_F(RecordedSequences, KitchenIsTracked) {
+  const TrackedRun run = trackAll("sevenscenes_redkitchen", 1, {}, false);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+  EXPECT_LE(errorMm(run, "sevenscenes_redkitchen", AlignmentKind::kSimilarity), 80.0);
+}
+
+TEST_F(RecordedSequences, DeskTranslationEndsWhereItBegan) {
+  const TrackedRun run = trackAll("oekf_desk_translation", 1, {}, false);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+  const Excursion excursion = measureExcursion(run.tracked);
+  EXPECT_LE(excursion.displacement, 0.07 * excursion.excursion);
+}
+
+TEST_F(RecordedSequences, ActiveMatchingKeepsTheDeskDownToTenHertz) {
+  for (const int every : {2, 3}) {
+    const TrackedRun run = trackAll("davison_monoslam_desk", every, withMatcher("active"), false);
+    EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames) << "every " << every;
+    EXPECT_LE(errorMm(run, "davison_monoslam_desk", AlignmentKind::kSimilarity), 20.0)
+        << "every " << every;
+  }
+}
+
+TEST_F(RecordedSequences, ActiveMatchingKeepsEveryFrameOfTheDeskAtSevenAndAHalfHertz) {
+  const TrackedRun run = trackAll("davison_monoslam_desk", 4, withMatcher("active"), false);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+}
+
+TEST_F(RecordedSequences, ActiveMatchingKeepsTheCheckerboardAtFifteenHertz) {
+  const TrackedRun run = trackAll("uzh_vamr_checkerboard", 2, withMatcher("active"), false);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+  EXPECT_LE(errorMm(run, "uzh_vamr_checkerboard", AlignmentKind::kSimilarity), 6.0);
+}
+
+TEST_F(RecordedSequences, MoreFeaturesHelp) {
+  std::vector<double> errors;
+  for (const int features : {11, 40, 100}) {
+    TrackerOptions options = withMatcher("active");
+    options.map.features_per_frame = features;
+    const TrackedRun run = trackAll("davison_monoslam_desk", 1, options, false);
+    errors.push_back(errorMm(run, "davison_monoslam_desk", AlignmentKind::kSimilarity));
+  }
+  EXPECT_LE(errors[1], errors[0]);
+  EXPECT_LE(errors[2], errors[0]);
+}
+
+TEST_F(RecordedSequences, ActiveMatchingSearchesAFractionOfTheGates) {
+  const std::vector<std::pair<int, double>> cases = {{1, 4.0}, {2, 7.0}};
+  for (const auto& [every, ratio] : cases) {
+    TrackerOptions options = withMatcher("active");
+    options.map.features_per_frame = 11;
+    const TrackedRun run = trackAll("davison_monoslam_desk", every, options, false);
+    EXPECT_GE(double(run.pixels_full_gates), ratio * double(run.pixels)) << "every " << every;
+  }
+}
+
+}  // namespace
+}  // namespace active_matching_slam

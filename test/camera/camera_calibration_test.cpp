@@ -1,0 +1,193 @@
+#include "active_matching_slam/camera/camera_calibration.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+
+#include "active_matching_slam/camera/camera_model.h"
+#include "camera/test_calibrations.h"
+
+namespace active_matching_slam {
+namespace {
+
+std::string faultOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string faultAfter(const std::function<void(CameraCalibration*)>& damage,
+                       DistortionModel model = DistortionModel::kPlumbBob) {
+  CameraCalibration calibration = makeCalibration(model, {});
+  if (model == DistortionModel::kEquidistant) calibration.distortion.assign(4, 0.0);
+  if (model == DistortionModel::kRationalPolynomial) calibration.distortion.assign(8, 0.0);
+  damage(&calibration);
+  EXPECT_THROW(checkCalibration(calibration), std::invalid_argument);
+  return faultOf([&] { checkCalibration(calibration); });
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+#define EXPECT_NAMES(text, part) EXPECT_TRUE(contains(text, part)) << text
+
+TEST(CheckCalibration, EveryLensPasses) {
+  for (const CameraCalibration& calibration : lenses())
+    EXPECT_NO_THROW(checkCalibration(calibration)) << calibration.name;
+}
+
+TEST(CheckCalibration, ZeroFocalLengthIsNamedUncalibrated) {
+  const std::string fault = faultAfter([](CameraCalibration* c) { c->fx = 0.0; });
+  EXPECT_NAMES(fault, "K[0]");
+  EXPECT_NAMES(fault, "uncalibrated");
+}
+
+TEST(CheckCalibration, EveryFieldAtFaultIsNamed) {
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->width = 0; }), "image_width");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->height = -3; }), "image_height is -3");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->fx = NAN; }), "fx");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->fy = -400.0; }), "fy (K[4]) is -400");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->cx = NAN; }), "cx");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->cy = INFINITY; }), "cy");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) {
+                 c->distortion = {0.1, NAN, 0.0, 0.0};
+               }),
+               "D[1]");
+}
+
+TEST(CheckCalibration, WrongNumberOfCoefficientsIsRefusedWithTheModelsName) {
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->distortion.assign(3, 0.1); }), "plumb_bob");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->distortion.assign(5, 0.1); },
+                          DistortionModel::kRationalPolynomial),
+               "8, 12, 14");
+  EXPECT_NAMES(faultAfter([](CameraCalibration* c) { c->distortion.assign(5, 0.1); },
+                          DistortionModel::kEquidistant),
+               "equidistant");
+}
+
+TEST(CheckCalibration, ThinPrismAndTiltAreRefusedByName) {
+  CameraCalibration calibration =
+      makeCalibration(DistortionModel::kRationalPolynomial, std::vector<double>(14, 0.0));
+  EXPECT_NO_THROW(checkCalibration(calibration));
+  calibration.distortion[9] = 0.001;
+  EXPECT_NAMES(faultOf([&] { checkCalibration(calibration); }), "s2");
+  calibration.distortion[9] = 0.0;
+  calibration.distortion[13] = 0.001;
+  EXPECT_NAMES(faultOf([&] { checkCalibration(calibration); }), "tau_y");
+}
+
+TEST(CheckCalibration, DistortionWithoutAModelIsNotIgnored) {
+  EXPECT_NAMES(
+      faultAfter([](CameraCalibration* c) { c->distortion = {0.1}; }, DistortionModel::kNone),
+      "D[0]");
+  EXPECT_NO_THROW(checkCalibration(makeCalibration(DistortionModel::kNone, {0.0, 0.0})));
+}
+
+TEST(DistortionModelName, SurvivesTheRoundTrip) {
+  for (const CameraCalibration& c : lenses())
+    EXPECT_EQ(distortionModelFromName(distortionModelName(c.distortion_model)), c.distortion_model);
+  EXPECT_EQ(distortionModelFromName(""), DistortionModel::kNone);
+  EXPECT_NAMES(faultOf([] { distortionModelFromName("thirdOrder"); }), "thirdOrder");
+}
+
+class CalibrationYaml : public testing::Test {
+ protected:
+  void TearDown() override { std::remove(path_.c_str()); }
+  CameraCalibration read(const std::string& text) {
+    std::ofstream(path_) << text;
+    return readCalibrationYaml(path_);
+  }
+  std::string faultOfText(const std::string& text) {
+    return faultOf([&] { read(text); });
+  }
+  std::string path_ = testing::TempDir() + "calibration_yaml_test.yaml";
+  const std::string size_ = "image_width: 320\nimage_height: 240\ncamera_name: desk\n";
+  const std::string matrix_ =
+      "camera_matrix: {rows: 3, cols: 3, data: [195, 0, 162, 0, 196, 125, 0, 0, 1]}\n";
+  const std::string lens_ =
+      "distortion_model: plumb_bob\n"
+      "distortion_coefficients: {rows: 1, cols: 5, data: [0.1, -0.2, 0.3, 0.4, 0.5]}\n";
+};
+
+TEST_F(CalibrationYaml, EveryFieldArrives) {
+  const CameraCalibration c = read(size_ + matrix_ + lens_);
+  EXPECT_EQ(c.name, "desk");
+  EXPECT_EQ(c.width, 320);
+  EXPECT_EQ(c.height, 240);
+  EXPECT_EQ(c.fx, 195.0);
+  EXPECT_EQ(c.fy, 196.0);
+  EXPECT_EQ(c.cx, 162.0);
+  EXPECT_EQ(c.cy, 125.0);
+  EXPECT_EQ(c.distortion_model, DistortionModel::kPlumbBob);
+  EXPECT_EQ(c.distortion, (std::vector<double>{0.1, -0.2, 0.3, 0.4, 0.5}));
+}
+
+TEST_F(CalibrationYaml, FaultsNameFileAndField) {
+  for (const std::string& fault :
+       {faultOfText(matrix_ + lens_), faultOfText(size_ + lens_), faultOfText(size_ + matrix_)})
+    EXPECT_NAMES(fault, path_);
+  EXPECT_NAMES(faultOfText(matrix_ + lens_), "image_width");
+  EXPECT_NAMES(faultOfText(size_ + lens_), "camera_matrix");
+  EXPECT_NAMES(faultOfText(size_ + matrix_), "distortion_coefficients");
+  EXPECT_NAMES(faultOfText(size_ + "camera_matrix: {data: [1, 2]}\n" + lens_), "has 2 numbers");
+  EXPECT_NAMES(faultOfText(size_ + "camera_matrix: {data: [a, b]}\n" + lens_), "list of numbers");
+  EXPECT_NAMES(faultOfText("image_width: wide\nimage_height: 3\n" + matrix_), "image_width");
+  EXPECT_NAMES(faultOfText(size_ + matrix_ + "distortion_model: potato\n"), "potato");
+  EXPECT_NAMES(faultOfText(size_ + "camera_matrix: {data: [0, 0, 0, 0, 0, 0, 0, 0, 1]}\n" + lens_),
+               "uncalibrated");
+}
+
+TEST_F(CalibrationYaml, TextThatIsNoYamlIsRefusedWithTheFilesName) {
+  EXPECT_NAMES(faultOfText("a: [1, 2"), path_);
+  EXPECT_NAMES(faultOfText("just words"), path_);
+  EXPECT_NAMES(faultOfText(""), path_);
+  EXPECT_NAMES(faultOf([] { readCalibrationYaml("/nonexistent/camera.yaml"); }),
+               "/nonexistent/camera.yaml");
+}
+
+TEST_F(CalibrationYaml, WithoutModelNameItIsPlumbBob) {
+  const std::string coefficients = "distortion_coefficients: {data: [0.1, 0, 0, 0, 0]}\n";
+  EXPECT_EQ(read(size_ + matrix_ + coefficients).distortion_model, DistortionModel::kPlumbBob);
+}
+
+TEST(CropAndBin, ShiftsThePrincipalPointThenDividesAllByTheBinning) {
+  const CameraCalibration full = lenses()[2];
+  const CameraCalibration part = cropAndBin(full, 100, 60, 401, 300, 2, 4);
+  EXPECT_EQ(part.width, 200);
+  EXPECT_EQ(part.height, 75);
+  EXPECT_EQ(part.distortion, full.distortion);
+  // A point seen at (u, v) in full resolution is seen at ((u - x) / bx, (v - y) / by).
+  const Eigen::Vector3d point(0.1, -0.2, 1.3);
+  const Eigen::Vector2d in_full = *CameraModel(full).project(point);
+  const Eigen::Vector2d in_part = *CameraModel(part).project(point);
+  EXPECT_NEAR(in_part.x(), (in_full.x() - 100.0) / 2.0, 1e-10);
+  EXPECT_NEAR(in_part.y(), (in_full.y() - 60.0) / 4.0, 1e-10);
+}
+
+TEST(CropAndBin, ZerosMeanTheWholeImageWithoutBinning) {
+  const CameraCalibration full = lenses()[0];
+  const CameraCalibration same = cropAndBin(full, 0, 0, 0, 0, 0, 0);
+  EXPECT_EQ(same.width, full.width);
+  EXPECT_EQ(same.height, full.height);
+  EXPECT_EQ(same.fx, full.fx);
+  EXPECT_EQ(same.cy, full.cy);
+}
+
+TEST(CropAndBin, ARegionOutsideTheImageIsRefusedByName) {
+  const CameraCalibration full = lenses()[0];
+  EXPECT_NAMES(faultOf([&] { cropAndBin(full, 640, 0, 10, 10, 1, 1); }), "roi.x_offset");
+  EXPECT_NAMES(faultOf([&] { cropAndBin(full, 0, -1, 10, 10, 1, 1); }), "roi.y_offset");
+  EXPECT_NAMES(faultOf([&] { cropAndBin(full, 600, 0, 41, 10, 1, 1); }), "roi.width");
+  EXPECT_NAMES(faultOf([&] { cropAndBin(full, 0, 0, 10, 481, 1, 1); }), "roi.height");
+  EXPECT_NAMES(faultOf([&] { cropAndBin(full, 0, 0, 10, 10, 11, 1); }), "binning_x");
+  EXPECT_NAMES(faultOf([&] { cropAndBin(full, 0, 0, 10, 10, 1, -2); }), "binning_y");
+}
+
+}  // namespace
+}  // namespace active_matching_slam

@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""Holds the documents to what the package has: links, scripts, launch files, tools, parameters."""
+
+import functools
+import os
+import re
+import subprocess
+import sys
+import unittest
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+PACKAGE = "active_matching_slam"
+SOURCE = Path(__file__).resolve().parents[2]
+PROGRAMS = Path(os.environ["AMS_PROGRAMS"])  # where the built tools are
+DOCUMENTS = [SOURCE / "README.md"] + sorted((SOURCE / "doc").glob("*.md"))
+
+
+def lines():
+    """(place, line) of every document, commands continued by a backslash as one line."""
+    for document in DOCUMENTS:
+        text = document.read_text(encoding="utf-8").replace("\\\n", " ")
+        for number, line in enumerate(text.splitlines(), 1):
+            yield "{}:{}".format(document.name, number), line
+
+
+def run(program, *arguments):
+    return subprocess.run([str(PROGRAMS / program), *arguments], check=True, timeout=60,
+                          stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                          universal_newlines=True).stdout
+
+
+@functools.lru_cache(maxsize=None)
+def options(tool):
+    return set(re.findall(r"(--[a-z][\w-]*)", run(tool, "--help")))
+
+
+def anchor(heading):
+    """As GitHub makes it."""
+    kept = re.sub(r"[^\w\- ]", "", heading.strip().lower())
+    return kept.replace(" ", "-")
+
+
+class Documents(unittest.TestCase):
+    def test_every_link_leads_somewhere(self):
+        for document in DOCUMENTS:
+            for link in re.findall(r"\]\(([^)\s]+)\)", document.read_text(encoding="utf-8")):
+                if link.startswith("http"):
+                    continue
+                path, _, fragment = link.partition("#")
+                target = (document.parent / path) if path else document
+                self.assertTrue(target.exists(), "{}: no {}".format(document.name, link))
+                if fragment:
+                    headings = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.M)
+                    self.assertIn(fragment, map(anchor, headings), document.name)
+
+    def test_every_script_named_exists(self):
+        for place, line in lines():
+            for name in re.findall(r"\bscripts/(\w+)", line):
+                self.assertTrue(os.access(str(SOURCE / "scripts" / name), os.X_OK),
+                                "{}: no scripts/{}".format(place, name))
+
+    def test_every_launch_file_named_exists_and_has_the_arguments_given(self):
+        for place, line in lines():
+            for name in re.findall(r"\b(\w+\.launch)\b", line):
+                self.assertTrue((SOURCE / "launch" / name).exists(), "{}: {}".format(place, name))
+            command = re.search(r"roslaunch " + PACKAGE + r" (\w+\.launch)([^#`]*)", line)
+            if command:
+                launch = ElementTree.parse(str(SOURCE / "launch" / command.group(1))).getroot()
+                known = {argument.get("name") for argument in launch.findall("arg")}
+                given = set(re.findall(r"(\w+):=", command.group(2)))
+                self.assertLessEqual(given, known, place)
+
+    def test_every_tool_named_exists_and_has_the_options_given(self):
+        tools = {path.stem for path in (SOURCE / "src" / "tools").glob("*.cpp")}
+        for place, line in lines():
+            for tool in re.findall(r"rosrun " + PACKAGE + r" (\w+)", line):
+                self.assertIn(tool, tools | {"TOOL"}, place)
+            for tool, rest in re.findall(r"\b(" + "|".join(tools) + r")((?: [^#`]*)?)", line):
+                given = set(re.findall(r"(--[a-z][\w-]*)", rest))
+                if given:
+                    self.assertLessEqual(given, options(tool), "{}: {}".format(place, tool))
+
+    def test_every_topic_and_service_in_the_tables_is_advertised(self):
+        code = "".join(path.read_text(encoding="utf-8")
+                       for path in sorted((SOURCE / "src" / "ros").glob("*.cpp")))
+        for name in re.findall(r"`~([\w/]+)`", (SOURCE / "README.md").read_text(encoding="utf-8")):
+            self.assertIn('"{}"'.format(name.split("/")[-1]), code, "~" + name)
+
+    def test_the_table_of_parameters_is_what_the_program_prints(self):
+        readme = (SOURCE / "README.md").read_text(encoding="utf-8")
+        table = readme.split("<!-- parameter_table -->\n")[1].split("<!-- end -->")[0]
+        self.assertEqual(table, run("parameter_table"), "run scripts/update_parameter_table")
+
+    def test_every_parameter_named_exists(self):
+        known = set(re.findall(r"^\| `([\w/]+)` \|", run("parameter_table"), re.M))
+        groups = {name.split("/")[0] for name in known if "/" in name}
+        for place, line in lines():
+            for name in re.findall(r"`((?:" + "|".join(groups) + r")/\w+)`", line):
+                self.assertIn(name, known, place)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv, verbosity=2)

@@ -1,0 +1,238 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "active_matching_slam/filter/ekf.h"
+#include "filter/example_filter.h"
+
+namespace active_matching_slam {
+namespace {
+
+class EkfMap : public ::testing::Test {
+ protected:
+  const CameraModel model_{exampleCalibration()};
+};
+
+TEST_F(EkfMap, PredictionEqualsThePlainFormulaWithANumericalJacobian) {
+  const Ekf before = exampleFilter(model_, 1);
+  Ekf filter = before;
+  const double dt = 0.13, step = 1e-4;
+  filter.predict(dt);
+  const int n = before.stateSize();
+
+  // Motion of the mean perturbed by the camera's error and by the impulses, from the equations.
+  const auto moved = [&](const Eigen::VectorXd& d) {
+    CameraState camera = before.camera();
+    std::vector<FeatureState> none;
+    applyError(d.head<12>(), camera, none);
+    camera.velocity_world += d.segment<3>(12);
+    camera.angular_velocity_camera += d.segment<3>(15);
+    camera.position_world += camera.velocity_world * dt;
+    camera.q_world_camera =
+        camera.q_world_camera * rotationFromVector(camera.angular_velocity_camera * dt);
+    return errorBetween(filter.camera(), none, camera, none, 12);
+  };
+  Eigen::MatrixXd J(12, 18);
+  for (int i = 0; i < 18; ++i) {
+    const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(18, i);
+    J.col(i) = (moved(d) - moved(-d)) / (2.0 * step);
+  }
+  EXPECT_LT(moved(Eigen::VectorXd::Zero(18)).norm(), 1e-14) << "mean";
+  Eigen::MatrixXd F = Eigen::MatrixXd::Identity(n, n);
+  F.topLeftCorner<12, 12>() = J.leftCols<12>();
+  Eigen::Matrix<double, 6, 6> Q = Eigen::Matrix<double, 6, 6>::Identity();
+  Q *= dt * dt;  // both accelerations are 1 here
+  Eigen::MatrixXd P = F * before.covariance() * F.transpose();
+  P.topLeftCorner<12, 12>() += J.rightCols<6>() * Q * J.rightCols<6>().transpose();
+  EXPECT_LT((filter.covariance() - P).norm(), 1e-8 * P.norm());
+  EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
+}
+
+TEST_F(EkfMap, PredictionOverNoTimeOrNonsenseChangesNothing) {
+  const Ekf before = exampleFilter(model_, 2);
+  for (const double dt : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    Ekf filter = before;
+    filter.predict(dt);
+    EXPECT_EQ(filter.covariance(), before.covariance());
+    EXPECT_EQ(filter.camera().position_world, before.camera().position_world);
+  }
+}
+
+TEST_F(EkfMap, ANewFeatureIsPredictedWhereItWasSeenWhateverItsDepth) {
+  Ekf filter = exampleFilter(model_, 3);
+  Random random(3);
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector2d pixel = random.pixel();
+    const FeatureId id = filter.addInverseDepthFeature(model_, pixel, random.uniform(0.01, 2.0));
+    ASSERT_GE(id, 0);
+    const PredictedMeasurements predicted = filter.predictMeasurements(model_, {id});
+    EXPECT_LT((predicted.z - pixel).norm(), 1e-6);
+    // The camera's error cancels: what is left is the pixel's noise, at first sight and now.
+    EXPECT_LT((predicted.S - 2.0 * Eigen::Matrix2d::Identity()).norm(), 1e-5);
+  }
+}
+
+TEST_F(EkfMap, ANewFeatureIsFullyCorrelatedWithThePose) {
+  const Ekf before = exampleFilter(model_, 4);
+  Ekf filter = before;
+  const Eigen::Vector2d pixel(200.0, 300.0);
+  const FeatureId id = filter.addInverseDepthFeature(model_, pixel, 0.4, 0.2);
+  const FeatureState& feature = *filter.find(id);
+  const int n = before.stateSize();
+  // Numerical Jacobian of (anchor, bearing, rho) by pose, pixel and rho.
+  const auto created = [&](const Eigen::VectorXd& d) {
+    CameraState camera = before.camera();
+    std::vector<FeatureState> none;
+    Eigen::VectorXd pose = Eigen::VectorXd::Zero(12);
+    pose.head<6>() = d.head<6>();
+    applyError(pose, camera, none);
+    Eigen::VectorXd error(6);
+    const Eigen::Vector3d bearing =
+        camera.q_world_camera * *model_.unproject(pixel + Eigen::Vector2d(d.segment<2>(6)));
+    error << camera.position_world - feature.anchor_world,
+        feature.tangentBasis().transpose() * (bearing - feature.bearing_world), d[8];
+    return error;
+  };
+  Eigen::MatrixXd J(6, 9);
+  for (int i = 0; i < 9; ++i) {
+    const double step = i >= 6 && i < 8 ? 1e-2 : 1e-5;
+    const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(9, i);
+    J.col(i) = (created(d) - created(-d)) / (2.0 * step);
+  }
+  Eigen::MatrixXd grow = Eigen::MatrixXd::Zero(n + 6, n + 3);
+  grow.topLeftCorner(n, n).setIdentity();
+  grow.bottomLeftCorner<6, 6>() = J.leftCols<6>();
+  grow.bottomRightCorner<6, 3>() = J.rightCols<3>();
+  Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + 3, n + 3);
+  joint.topLeftCorner(n, n) = before.covariance();
+  joint.bottomRightCorner<3, 3>() = Eigen::Vector3d(1.0, 1.0, 0.04).asDiagonal();
+  const Eigen::MatrixXd P = grow * joint * grow.transpose();
+  EXPECT_LT((filter.covariance() - P).norm(), 1e-8 * P.norm());
+  EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
+}
+
+TEST_F(EkfMap, FeaturesThatCanNotBeUnprojectedAreRefused) {
+  Ekf filter = exampleFilter(model_, 5);
+  const int size = filter.stateSize();
+  EXPECT_EQ(filter.addInverseDepthFeature(model_, Eigen::Vector2d(std::nan(""), 1.0)), -1);
+  EXPECT_EQ(filter.stateSize(), size);
+}
+
+TEST_F(EkfMap, RemovingKeepsTheRestOfTheCovariance) {
+  const Ekf before = exampleFilter(model_, 6);
+  Ekf filter = before;
+  const std::vector<FeatureId> ids = idsOf(before);
+  ASSERT_GT(ids.size(), 8u);
+  filter.removeFeatures({ids[7], 4711, ids[0], ids[3], ids[3], ids.back()});
+  ASSERT_EQ(filter.features().size(), ids.size() - 4);
+  int offset = CameraError::kSize;
+  for (const FeatureState& a : filter.features()) {
+    EXPECT_EQ(a.offset, offset);
+    offset += a.size();
+    const FeatureState& was_a = *before.find(a.id);
+    EXPECT_EQ(a.position(), was_a.position());
+    EXPECT_EQ(filter.covariance().block(0, a.offset, 12, a.size()),
+              before.covariance().block(0, was_a.offset, 12, a.size()));
+    for (const FeatureState& b : filter.features()) {
+      EXPECT_EQ(
+          filter.covariance().block(a.offset, b.offset, a.size(), b.size()),
+          before.covariance().block(was_a.offset, before.find(b.id)->offset, a.size(), b.size()));
+    }
+  }
+  EXPECT_EQ(offset, filter.stateSize());
+  EXPECT_EQ(filter.find(ids[0]), nullptr);
+}
+
+TEST_F(EkfMap, IdsAreNeverUsedAgain) {
+  Ekf filter(exampleOptions());
+  filter.reset(CameraState(), 1e-4 * Eigen::Matrix<double, 12, 12>::Identity());
+  const FeatureId first = filter.addInverseDepthFeature(model_, Eigen::Vector2d(100.0, 100.0));
+  filter.removeFeatures({first});
+  const FeatureId second = filter.addInverseDepthFeature(model_, Eigen::Vector2d(100.0, 100.0));
+  filter.reset(CameraState(), 1e-4 * Eigen::Matrix<double, 12, 12>::Identity());
+  EXPECT_EQ(filter.stateSize(), 12);
+  const FeatureId third =
+      filter.addPointFeature(Eigen::Vector3d(0.0, 0.0, 1.0), 1e-4 * Eigen::Matrix3d::Identity());
+  EXPECT_LT(first, second);
+  EXPECT_LT(second, third);
+}
+
+TEST_F(EkfMap, GrowingPastTheReservedRoomKeepsEverything) {
+  Ekf filter = exampleFilter(model_, 7);
+  Random random(7);
+  Eigen::MatrixXd before = filter.covariance();
+  for (int i = 0; i < 60; ++i) {
+    filter.addInverseDepthFeature(model_, random.pixel());
+    const int n = static_cast<int>(before.rows());
+    ASSERT_EQ(filter.covariance().topLeftCorner(n, n), before);
+    before = filter.covariance();
+  }
+}
+
+TEST_F(EkfMap, AKnownPointIsIndependentOfTheRest) {
+  Ekf filter = exampleFilter(model_, 8);
+  const int n = filter.stateSize();
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(1e-4, 2e-4, 3e-4).asDiagonal();
+  const FeatureId id = filter.addPointFeature(Eigen::Vector3d(1.0, 2.0, 3.0), covariance);
+  EXPECT_EQ(filter.positionCovariance(*filter.find(id)), covariance);
+  EXPECT_EQ(filter.covariance().block(n, 0, 3, n), Eigen::MatrixXd::Zero(3, n));
+  EXPECT_EQ(filter.find(id)->position(), Eigen::Vector3d(1.0, 2.0, 3.0));
+}
+
+TEST_F(EkfMap, ConvertsWellKnownDepthsOnlyAndWithTheProperJacobian) {
+  const Ekf before = exampleFilter(model_, 9);
+  Ekf filter = before;
+  const FeatureId sharp =
+      filter.addInverseDepthFeature(model_, Eigen::Vector2d(200.0, 150.0), 0.5, 0.005);
+  const FeatureId vague =
+      filter.addInverseDepthFeature(model_, Eigen::Vector2d(400.0, 250.0), 0.5, 0.02);
+  const FeatureState feature = *filter.find(sharp);
+  const Eigen::MatrixXd P = filter.covariance();
+  // L = 4 sigma_rho / rho at first sight: 0.04 and 0.16 against the threshold of 0.1.
+  const std::vector<FeatureId> converted = filter.convertToPoints();
+  EXPECT_EQ(converted, std::vector<FeatureId>{sharp});
+  EXPECT_EQ(filter.find(sharp)->kind, FeatureKind::kPoint);
+  EXPECT_EQ(filter.find(vague)->kind, FeatureKind::kInverseDepth);
+  EXPECT_LT((filter.find(sharp)->position() - feature.position()).norm(), 1e-14);
+
+  const int n = static_cast<int>(P.rows());
+  Eigen::MatrixXd T = Eigen::MatrixXd::Identity(n, n);
+  for (int i = 0; i < 6; ++i) {
+    const auto moved = [&](double step) -> Eigen::Vector3d {
+      CameraState camera;
+      std::vector<FeatureState> features{feature};
+      applyError(step * Eigen::VectorXd::Unit(n, feature.offset + i), camera, features);
+      return features[0].position();
+    };
+    T.block<3, 1>(feature.offset, feature.offset + i) = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+  }
+  const Eigen::MatrixXd full = T * P * T.transpose();
+  const int o = feature.offset;
+  Eigen::MatrixXd expected(n - 3, n - 3);  // the vague feature comes last
+  expected << full.topLeftCorner(o + 3, o + 3), full.topRightCorner(o + 3, 6),
+      full.bottomLeftCorner(6, o + 3), full.bottomRightCorner(6, 6);
+  ASSERT_EQ(filter.stateSize(), n - 3);
+  EXPECT_LT((filter.covariance() - expected).norm(), 1e-7 * expected.norm());
+  EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
+}
+
+TEST_F(EkfMap, RescalingTheMapKeepsWhatIsSeen) {
+  Ekf filter = exampleFilter(model_, 10);
+  const auto before = filter.predictMeasurements(model_, idsOf(filter));
+  const Eigen::Vector3d position = filter.camera().position_world;
+  const double sigma_z = std::sqrt(filter.covariance()(2, 2));
+  filter.rescale(2.5);
+  const auto after = filter.predictMeasurements(model_, idsOf(filter));
+  EXPECT_LT((after.z - before.z).norm(), 1e-9 * before.z.norm());
+  EXPECT_LT((after.S - before.S).norm(), 1e-9 * before.S.norm());
+  EXPECT_LT((filter.camera().position_world - 2.5 * position).norm(), 1e-14);
+  EXPECT_NEAR(std::sqrt(filter.covariance()(2, 2)), 2.5 * sigma_z, 1e-12);
+  EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
+  for (const double bad : {0.0, -1.0, std::nan("")})
+    EXPECT_THROW(filter.rescale(bad), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace active_matching_slam

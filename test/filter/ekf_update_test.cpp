@@ -1,0 +1,293 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <limits>
+
+#include "active_matching_slam/filter/ekf.h"
+#include "filter/example_filter.h"
+
+namespace active_matching_slam {
+namespace {
+
+class EkfUpdate : public ::testing::Test {
+ protected:
+  const CameraModel model_{exampleCalibration()};
+};
+
+/// H written out in full.
+Eigen::MatrixXd denseJacobian(const Ekf& filter, const CameraModel& model,
+                              const std::vector<FeatureId>& ids) {
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2 * ids.size(), filter.stateSize());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const FeatureState& feature = *filter.find(ids[i]);
+    const auto projection = projectFeature(model, filter.camera(), feature);
+    H.block<2, 6>(2 * i, 0) = projection->d_camera;
+    H.block(2 * i, feature.offset, 2, feature.size()) =
+        projection->d_feature.leftCols(feature.size());
+  }
+  return H;
+}
+
+/// R: pixel noise, and what linearisation leaves out.
+Eigen::MatrixXd measurementNoise(const Ekf& filter, const CameraModel& model,
+                                 const std::vector<FeatureId>& ids) {
+  const int rows = 2 * static_cast<int>(ids.size());
+  CovarianceMatrix P;
+  P.reset(filter.stateSize());
+  P.view() = filter.covariance();
+  Eigen::MatrixXd R =
+      filter.options().sigma_px * filter.options().sigma_px * Eigen::MatrixXd::Identity(rows, rows);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const FeatureState& feature = *filter.find(ids[i]);
+    if (feature.kind != FeatureKind::kInverseDepth) continue;
+    R.block<2, 2>(2 * i, 2 * i) += secondOrderNoise(
+        *projectFeature(model, filter.camera(), feature), relativeCovariance(feature, P));
+  }
+  return R;
+}
+
+double relativeDifference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return (a - b).norm() / b.norm();
+}
+
+TEST_F(EkfUpdate, PredictedMeasurementsEqualThePlainFormula) {
+  const Ekf filter = exampleFilter(model_, 1);
+  const PredictedMeasurements predicted = filter.predictMeasurements(model_, idsOf(filter));
+  ASSERT_GT(predicted.ids.size(), 12u);
+  const Eigen::MatrixXd H = denseJacobian(filter, model_, predicted.ids);
+  Eigen::MatrixXd S = H * filter.covariance() * H.transpose();
+  S += measurementNoise(filter, model_, predicted.ids);
+  EXPECT_LT(relativeDifference(predicted.S, S), 1e-13);
+  EXPECT_EQ(predicted.S, predicted.S.transpose().eval());
+}
+
+TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    Ekf filter = exampleFilter(model_, seed);
+    Random random(seed + 100);
+    auto measurements = noisyMeasurements(filter, model_, 3.0, random);
+    measurements.resize(measurements.size() / 2);
+    FilterOptions once = filter.options();
+    once.update_iterations = 1;
+    filter.setOptions(once);
+    measurements[1].sigma_px = 2.5;
+    const Ekf before = filter;
+    const UpdateReport report = filter.update(model_, measurements);
+    ASSERT_TRUE(report.healthy);
+    ASSERT_EQ(report.used, static_cast<int>(measurements.size()));
+
+    std::vector<FeatureId> ids;
+    for (const auto& m : measurements) ids.push_back(m.id);
+    const int n = before.stateSize(), rows = 2 * static_cast<int>(ids.size());
+    const Eigen::MatrixXd H = denseJacobian(before, model_, ids);
+    const Eigen::MatrixXd P = before.covariance();
+    Eigen::MatrixXd R = measurementNoise(before, model_, ids);
+    R.block<2, 2>(2, 2) +=
+        (2.5 * 2.5 - once.sigma_px * once.sigma_px) * Eigen::Matrix2d::Identity();
+    const Eigen::MatrixXd S = H * P * H.transpose() + R;
+    const Eigen::MatrixXd K = P * H.transpose() * S.inverse();
+    Eigen::VectorXd innovation(rows);
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      innovation.segment<2>(2 * i) =
+          measurements[i].pixel -
+          projectFeature(model_, before.camera(), *before.find(ids[i]))->pixel;
+    }
+    const Eigen::VectorXd delta = K * innovation;
+    CameraState camera = before.camera();
+    std::vector<FeatureState> features = before.features();
+    applyError(delta, camera, features);
+    const Eigen::MatrixXd IKH = Eigen::MatrixXd::Identity(n, n) - K * H;
+    const Eigen::MatrixXd joseph = IKH * P * IKH.transpose() + K * R * K.transpose();
+    CovarianceMatrix prior;
+    prior.reset(n);
+    prior.view() = P;
+    const Eigen::MatrixXd L = gaugeFunctionals(before.camera(), before.features(), prior);
+    const Eigen::MatrixXd change = gaugeGenerators(camera, features, n) -
+                                   gaugeGenerators(before.camera(), before.features(), n);
+    const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(n, n) + change * L.transpose();
+
+    EXPECT_LT(relativeDifference(filter.covariance(), M * joseph * M.transpose()), 1e-10);
+    EXPECT_LT(errorBetween(camera, features, filter.camera(), filter.features(), n).norm(), 1e-10);
+    EXPECT_NEAR(report.nis, innovation.dot(S.inverse() * innovation), 1e-8 * report.nis);
+  }
+}
+
+/// Minus twice the logarithm of the posterior density.
+double posteriorCost(const Ekf& before, const Ekf& after, const CameraModel& model,
+                     const std::vector<FeatureMeasurement>& measurements) {
+  const Eigen::VectorXd delta = errorBetween(before.camera(), before.features(), after.camera(),
+                                             after.features(), before.stateSize());
+  double cost = delta.dot(Eigen::MatrixXd(before.covariance()).ldlt().solve(delta));
+  for (const FeatureMeasurement& m : measurements) {
+    const auto projection = projectFeature(model, after.camera(), *after.find(m.id));
+    const double sigma_px = before.options().sigma_px;
+    cost += (m.pixel - projection->pixel).squaredNorm() / (sigma_px * sigma_px);
+  }
+  return cost;
+}
+
+TEST_F(EkfUpdate, RepeatedLinearisationFindsABetterMeanAfterALargeTurn) {
+  Random random(11);
+  Eigen::Matrix<double, 12, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(0.1), Eigen::Vector3d::Constant(0.2),
+      Eigen::Matrix<double, 6, 1>::Constant(0.1);
+  Ekf prior(exampleOptions());
+  prior.reset(CameraState(), sigma.cwiseAbs2().asDiagonal());
+  CameraState truth;
+  truth.position_world = Eigen::Vector3d(0.1, -0.1, 0.1);
+  truth.q_world_camera = rotationFromVector(Eigen::Vector3d(0.2, -0.2, 0.3));
+  std::vector<FeatureMeasurement> measurements;
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector3d point = 2.0 * *model_.unproject(random.pixel());
+    const FeatureId id = prior.addPointFeature(point, 1e-6 * Eigen::Matrix3d::Identity());
+    const auto pixel = model_.project(truth.poseWorldCamera().inverse() * point);
+    if (pixel) measurements.push_back({id, *pixel, 0.0});
+  }
+  double last_cost = std::numeric_limits<double>::infinity();
+  for (const int iterations : {1, 2, 4}) {
+    FilterOptions options = prior.options();
+    options.update_iterations = iterations;
+    Ekf filter = prior;
+    filter.setOptions(options);
+    ASSERT_TRUE(filter.update(model_, measurements).healthy);
+    const double cost = posteriorCost(prior, filter, model_, measurements);
+    EXPECT_LT(cost, 0.5 * last_cost) << iterations;
+    last_cost = cost;
+    if (iterations == 4) {
+      EXPECT_LT((filter.camera().position_world - truth.position_world).norm(), 0.02);
+    }
+  }
+}
+
+TEST_F(EkfUpdate, SkipsWhatCanNotBeFusedAndLeavesTheRestUntouched) {
+  Ekf filter = exampleFilter(model_, 4);
+  Ekf expected = filter;
+  Random random(7);
+  auto good = noisyMeasurements(filter, model_, 1.0, random);
+  good.resize(3);
+  const FeatureId behind =
+      filter.addPointFeature(filter.camera().poseWorldCamera() * Eigen::Vector3d(0.1, 0.2, -2.0),
+                             1e-4 * Eigen::Matrix3d::Identity());
+  ASSERT_EQ(behind, expected.addPointFeature(filter.find(behind)->point_world,
+                                             1e-4 * Eigen::Matrix3d::Identity()));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  auto mixed = good;
+  mixed.push_back({good[0].id, Eigen::Vector2d(nan, 100.0), 0.0});
+  mixed.push_back({good[1].id, Eigen::Vector2d(100.0, infinity), 0.0});
+  mixed.push_back({good[2].id, Eigen::Vector2d(100.0, 100.0), nan});
+  mixed.push_back({behind, Eigen::Vector2d(100.0, 100.0), 0.0});
+  mixed.push_back({12345, Eigen::Vector2d(100.0, 100.0), 0.0});
+  const UpdateReport report = filter.update(model_, mixed);
+  EXPECT_EQ(report.used, 3);
+  EXPECT_EQ(report.skipped, 5);
+  EXPECT_TRUE(report.healthy);
+  expected.update(model_, good);
+  EXPECT_EQ(filter.covariance(), expected.covariance());
+  EXPECT_EQ(filter.camera().position_world, expected.camera().position_world);
+}
+
+TEST_F(EkfUpdate, WithoutMeasurementsChangesNothing) {
+  Ekf filter = exampleFilter(model_, 5);
+  const Eigen::MatrixXd before = filter.covariance();
+  const UpdateReport report = filter.update(model_, {});
+  EXPECT_EQ(report.used, 0);
+  EXPECT_TRUE(report.healthy);
+  EXPECT_EQ(filter.covariance(), before);
+}
+
+TEST_F(EkfUpdate, RefusesAnInnovationCovarianceThatCanNotBeFactorised) {
+  Ekf filter(exampleOptions());
+  Eigen::Matrix<double, 12, 12> indefinite = Eigen::Matrix<double, 12, 12>::Identity();
+  indefinite(0, 0) = indefinite(1, 1) = -9.0;
+  filter.reset(CameraState(), indefinite);
+  const FeatureId id =
+      filter.addPointFeature(Eigen::Vector3d(0.1, 0.1, 2.0), 1e-6 * Eigen::Matrix3d::Identity());
+  const Eigen::MatrixXd before = filter.covariance();
+  const UpdateReport report = filter.update(model_, {{id, Eigen::Vector2d(300.0, 200.0), 0.0}});
+  EXPECT_FALSE(report.healthy);
+  EXPECT_EQ(report.used, 0);
+  EXPECT_EQ(filter.covariance(), before);
+  EXPECT_EQ(filter.camera().position_world, Eigen::Vector3d::Zero());
+}
+
+TEST_F(EkfUpdate, SaysSoWhenItHadToRepairAVariance) {
+  Ekf filter(exampleOptions());
+  Eigen::Matrix<double, 12, 12> covariance = 1e-2 * Eigen::Matrix<double, 12, 12>::Identity();
+  // Correlated beyond one: not a covariance, though what is measured has one.
+  covariance(CameraError::kVelocity, CameraError::kPosition) = 0.05;
+  covariance(CameraError::kPosition, CameraError::kVelocity) = 0.05;
+  filter.reset(CameraState(), covariance);
+  const FeatureId id =
+      filter.addPointFeature(Eigen::Vector3d(0.1, 0.1, 1.0), 1e-6 * Eigen::Matrix3d::Identity());
+  const auto predicted = filter.predictMeasurements(model_, {id});
+  const UpdateReport report = filter.update(model_, {{id, predicted.z, 0.0}});
+  EXPECT_FALSE(report.healthy);
+  EXPECT_GE(filter.covariance().diagonal().minCoeff(), 0.0);
+}
+
+TEST_F(EkfUpdate, KeepsInverseDepthsAboveTheirMinimumWithoutTouchingTheCovariance) {
+  // A parallax of the wrong sign: the best inverse depth is negative, beyond infinity.
+  FilterOptions options = exampleOptions();
+  options.minimum_inverse_depth = 1e-3;
+  Ekf filter(options);
+  CameraState camera;
+  camera.velocity_world.x() = 1.0;
+  filter.reset(camera, 1e-12 * Eigen::Matrix<double, 12, 12>::Identity());
+  const FeatureId id = filter.addInverseDepthFeature(model_, Eigen::Vector2d(320.0, 240.0));
+  FilterOptions still = options;
+  still.sigma_acceleration_mps2 = still.sigma_angular_acceleration_rps2 = 1e-3;
+  filter.setOptions(still);
+  filter.predict(0.3);
+  Ekf undisturbed = filter;
+  const auto predicted = filter.predictMeasurements(model_, {id});
+  const Eigen::Vector2d beyond(380.0, 240.0);
+  ASSERT_GT(beyond.x(), predicted.z.x());
+  const UpdateReport report = filter.update(model_, {{id, beyond, 0.0}});
+  EXPECT_TRUE(report.healthy);
+  EXPECT_EQ(filter.find(id)->inverse_depth, 1e-3);
+  EXPECT_TRUE(filter.find(id)->position().allFinite());
+  EXPECT_GT(filter.sigmaInverseDepth(*filter.find(id)), 0.0);
+  // The limit applies to the mean alone: without it the covariance is the same.
+  still.minimum_inverse_depth = 1e-9;
+  undisturbed.setOptions(still);
+  undisturbed.update(model_, {{id, beyond, 0.0}});
+  EXPECT_EQ(undisturbed.covariance(), filter.covariance());
+}
+
+TEST_F(EkfUpdate, StaysSymmetricAndPositiveOverALongRun) {
+  Ekf filter = exampleFilter(model_, 8);
+  Random random(8);
+  for (int frame = 0; frame < 300; ++frame) {
+    filter.predict(1.0 / 30.0);
+    const UpdateReport report =
+        filter.update(model_, noisyMeasurements(filter, model_, 1.0, random));
+    ASSERT_TRUE(report.healthy) << frame;
+    filter.convertToPoints();
+    if (frame % 5 == 0) {
+      if (filter.features().size() > 20) filter.removeFeatures({filter.features().front().id});
+      filter.addInverseDepthFeature(model_, random.pixel());
+    }
+    if (frame % 50 != 49) continue;
+    const Eigen::MatrixXd P = filter.covariance();
+    ASSERT_EQ(P, P.transpose().eval());
+    const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(P).eigenvalues();
+    ASSERT_GT(values.minCoeff(), -1e-13 * values.maxCoeff()) << frame;
+    ASSERT_NEAR(filter.camera().q_world_camera.norm(), 1.0, 1e-14);
+  }
+}
+
+TEST_F(EkfUpdate, IsTheSameBitForBitWhenRepeated) {
+  const auto run = [this] {
+    Ekf filter = exampleFilter(model_, 9, 40);
+    Random random(9);
+    filter.update(model_, noisyMeasurements(filter, model_, 1.0, random));
+    return Eigen::MatrixXd(filter.covariance());
+  };
+  EXPECT_EQ(run(), run());
+}
+
+}  // namespace
+}  // namespace active_matching_slam

@@ -1,0 +1,286 @@
+#include "active_matching_slam/map/map_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <boost/crc.hpp>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+namespace active_matching_slam {
+namespace {
+
+MapFileContent smallMap() {
+  MapFileContent content;
+  content.camera = {"left",
+                    320,
+                    240,
+                    250.0,
+                    251.0,
+                    160.0,
+                    120.0,
+                    DistortionModel::kPlumbBob,
+                    {-0.1, 0.01, 0.001, -0.001, 0.0}};
+  content.template_size_px = 11;
+  content.source_patch_size_px = 15;
+  content.scale_source = 2;
+  Ekf filter{FilterOptions()};
+  filter.reset(CameraState(), 0.01 * Eigen::Matrix<double, 12, 12>::Identity());
+  const CameraModel camera(content.camera);
+  filter.addInverseDepthFeature(camera, {100.25, 80.5}, 0.5, 0.1);
+  filter.addPointFeature({0.3, -0.2, 2.0}, 0.01 * Eigen::Matrix3d::Identity());
+  filter.addInverseDepthFeature(camera, {200.0, 120.0});
+  filter.removeFeatures({0});
+  filter.addInverseDepthFeature(camera, {220.0, 20.0});
+  filter.predict(0.1);
+  content.camera_state = filter.camera();
+  content.features = filter.features();
+  content.covariance = filter.covariance();
+  content.next_id = filter.nextId();
+  for (const FeatureState& state : content.features) {
+    MapFeature feature;
+    feature.id = state.id;
+    feature.attempts = 7;
+    feature.successes = 5;
+    feature.first_frame = 3;
+    feature.patch.image.create(15, 15, CV_8UC1);
+    for (int i = 0; i < 15 * 15; ++i)
+      feature.patch.image.data[i] = static_cast<std::uint8_t>(state.id + 31 * i);
+    feature.patch.pixel = {100.25, 80.5};
+    feature.patch.center = {7.0, 7.0};
+    content.map.push_back(feature);
+  }
+  return content;
+}
+
+/// A folder of its own, removed at the end.
+class MapFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    char name[] = "/tmp/map_file_test_XXXXXX";
+    folder_ = ::mkdtemp(name);
+    path_ = folder_ + "/room.map";
+  }
+  void TearDown() override {
+    ::unlink(path_.c_str());
+    EXPECT_EQ(::rmdir(folder_.c_str()), 0) << "something was left beside the map";
+  }
+  std::string folder_, path_;
+};
+
+void expectRefused(const std::string& bytes, const std::string& cause) {
+  try {
+    parseMap(bytes);
+    FAIL() << "accepted, not refused for: " << cause;
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find(cause), std::string::npos) << error.what();
+  }
+}
+
+void setNumber(std::string* bytes, std::size_t offset, std::uint64_t value, int size) {
+  for (int i = 0; i < size; ++i) (*bytes)[offset + i] = static_cast<char>(value >> (8 * i) & 0xff);
+}
+
+/// Makes size and checksum right, so that the content itself is put to the test.
+void seal(std::string* bytes) {
+  setNumber(bytes, 16, bytes->size() - 24, 8);
+  boost::crc_32_type crc;
+  crc.process_bytes(bytes->data() + 16, bytes->size() - 16);
+  setNumber(bytes, 12, crc.checksum(), 4);
+}
+
+TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
+  const MapFileContent written = smallMap();
+  writeMapFile(path_, written);
+  writeMapFile(path_, written);  // over the old one
+  const MapFileContent read = readMapFile(path_);
+  EXPECT_EQ(read.camera.name, "left");
+  EXPECT_EQ(read.camera.distortion, written.camera.distortion);
+  EXPECT_EQ(read.covariance, written.covariance);
+  EXPECT_EQ(read.next_id, 4);
+  EXPECT_EQ(read.scale_source, 2);
+  ASSERT_EQ(read.features.size(), 3u);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(read.features[i].id, i + 1);
+    EXPECT_EQ(read.features[i].offset, written.features[i].offset);
+    EXPECT_EQ(read.features[i].bearing_world, written.features[i].bearing_world);
+    EXPECT_EQ(cv::norm(read.map[i].patch.image, written.map[i].patch.image, cv::NORM_INF), 0.0);
+    EXPECT_EQ(read.map[i].successes, 5);
+  }
+  EXPECT_EQ(serializeMap(read), serializeMap(written));
+}
+
+TEST_F(MapFile, AFilterGoesOnFromItAsIfNeverStopped) {
+  const MapFileContent content = smallMap();
+  const CameraModel camera(content.camera);
+  Ekf before{FilterOptions()}, after{FilterOptions()};
+  before.restore(content.camera_state, content.features, content.covariance, content.next_id);
+  const MapFileContent read = parseMap(serializeMap(content));
+  after.restore(read.camera_state, read.features, read.covariance, read.next_id);
+  for (Ekf* filter : {&before, &after}) {
+    filter->predict(0.1);
+    filter->update(camera, {{2, {201.0, 121.0}, 0.0}, {1, {197.0, 95.0}, 0.0}});
+    EXPECT_EQ(filter->addInverseDepthFeature(camera, {50.0, 50.0}), 4);
+  }
+  EXPECT_EQ(Eigen::MatrixXd(before.covariance()), Eigen::MatrixXd(after.covariance()));
+  EXPECT_EQ(before.camera().position_world, after.camera().position_world);
+}
+
+TEST_F(MapFile, NamesFileAndCause) {
+  const auto cause = [&](const std::string& path) {
+    try {
+      readMapFile(path);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string("none");
+  };
+  EXPECT_EQ(cause(path_), "can't read map " + path_ + ": No such file or directory");
+  EXPECT_EQ(cause(folder_), "can't read map " + folder_ + ": it is not a file");
+  std::ofstream(path_) << "%YAML:1.0";
+  EXPECT_EQ(cause(path_), "can't read map " + path_ + ": it is not a map file");
+  EXPECT_THROW(writeMapFile(folder_ + "/missing/room.map", smallMap()), std::runtime_error);
+}
+
+TEST_F(MapFile, AFaultyStateIsNotWrittenAndTheOldFileStays) {
+  writeMapFile(path_, smallMap());
+  MapFileContent faulty = smallMap();
+  faulty.covariance(3, 3) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(writeMapFile(path_, faulty), std::runtime_error);
+  EXPECT_EQ(readMapFile(path_).map.size(), 3u);
+}
+
+TEST_F(MapFile, RefusesEveryTruncation) {
+  const std::string bytes = serializeMap(smallMap());
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_THROW(parseMap(bytes.substr(0, size)), std::runtime_error) << size;
+  for (std::size_t size = 24; size < bytes.size(); ++size) {
+    std::string sealed = bytes.substr(0, size);
+    seal(&sealed);
+    EXPECT_THROW(parseMap(sealed), std::runtime_error) << size;
+  }
+}
+
+TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
+  std::string bytes = serializeMap(smallMap());
+  bytes[bytes.size() / 2] ^= 1;
+  expectRefused(bytes, "damaged");
+  bytes = serializeMap(smallMap());
+  setNumber(&bytes, 8, 2, 4);
+  expectRefused(bytes, "version 2");
+  bytes = serializeMap(smallMap());
+  double infinity = std::numeric_limits<double>::infinity();
+  std::memcpy(&bytes[bytes.size() - 8], &infinity, 8);
+  seal(&bytes);
+  expectRefused(bytes, "not finite");
+  bytes = serializeMap(smallMap()) + std::string(8, '\0');
+  seal(&bytes);
+  expectRefused(bytes, "covariance");
+  bytes = serializeMap(smallMap());
+  setNumber(&bytes, 24, std::uint64_t{1} << 60, 8);
+  seal(&bytes);
+  expectRefused(bytes, "name");
+}
+
+// Deterministic fuzz: files with bytes changed, numbers replaced, parts removed or doubled, with a
+// right checksum. Each is either refused or a state that a filter can take over.
+TEST_F(MapFile, MutatedFilesAreRefusedOrSound) {
+  const std::string original = serializeMap(smallMap());
+  std::mt19937_64 random(1);
+  constexpr std::uint64_t kNumbers[] = {0,
+                                        1,
+                                        255,
+                                        0x7fffffff,
+                                        0xffffffff,
+                                        ~std::uint64_t{0},
+                                        std::uint64_t{1} << 62,
+                                        std::uint64_t{1} << 63,
+                                        0x7ff0000000000000,
+                                        0x7fefffffffffffff};
+  int accepted = 0;
+  for (int run = 0; run < 30000; ++run) {
+    std::string bytes = original;
+    for (int change = 0; change <= static_cast<int>(random() % 3); ++change) {
+      const std::size_t at = 24 + random() % (bytes.size() - 40);
+      switch (random() % 4) {
+        case 0:
+          bytes[at] = static_cast<char>(random());
+          break;
+        case 1:
+          setNumber(&bytes, at, kNumbers[random() % 10], 8);
+          break;
+        case 2:
+          bytes.erase(at, 1 + random() % 16);
+          break;
+        default:
+          bytes.insert(at, bytes.substr(at, 1 + random() % 16));
+      }
+      if (bytes.size() < 80) break;
+    }
+    if (run % 4 != 0) seal(&bytes);
+    try {
+      const MapFileContent content = parseMap(bytes);
+      ++accepted;
+      EXPECT_TRUE(content.covariance.allFinite());
+      EXPECT_EQ(serializeMap(content), bytes) << "run " << run;
+    } catch (const std::runtime_error&) {
+    }
+  }
+  EXPECT_GT(accepted, 100) << "the fuzz never gets past the checks";
+}
+
+TEST(EkfRestore, RefusesWhatDoesNotFitTogetherAndChangesNothing) {
+  const MapFileContent good = smallMap();
+  Ekf filter{FilterOptions()};
+  filter.restore(good.camera_state, good.features, good.covariance, good.next_id);
+  const auto expectThrow = [&](MapFileContent bad) {
+    EXPECT_THROW(filter.restore(bad.camera_state, bad.features, bad.covariance, bad.next_id),
+                 std::invalid_argument);
+  };
+  MapFileContent bad = good;
+  bad.next_id = 3;
+  expectThrow(bad);
+  bad = good;
+  std::swap(bad.features[0], bad.features[1]);
+  expectThrow(bad);
+  bad = good;
+  bad.covariance.conservativeResize(20, 20);
+  expectThrow(bad);
+  bad = good;
+  bad.covariance(0, 1) = bad.covariance(1, 0) = 1.0;
+  expectThrow(bad);
+  bad = good;
+  bad.covariance(0, 1) += 0.005;
+  expectThrow(bad);
+  bad = good;
+  bad.camera_state.q_world_camera.w() = 2.0;
+  expectThrow(bad);
+  bad = good;
+  bad.features[1].inverse_depth = 0.0;
+  expectThrow(bad);
+  EXPECT_EQ(Eigen::MatrixXd(filter.covariance()), good.covariance);
+  EXPECT_EQ(filter.nextId(), good.next_id);
+}
+
+TEST(EkfRestore, ARelocatedCameraHasNothingInCommonWithTheMap) {
+  const MapFileContent content = smallMap();
+  Ekf filter{FilterOptions()};
+  filter.restore(content.camera_state, content.features, content.covariance, content.next_id);
+  CameraState camera;
+  camera.position_world << 1.0, 2.0, 3.0;
+  filter.relocateCamera(camera, 0.04 * Eigen::Matrix<double, 12, 12>::Identity());
+  const Eigen::MatrixXd P = filter.covariance();
+  const int map_size = filter.stateSize() - 12;
+  EXPECT_EQ(filter.camera().position_world, camera.position_world);
+  EXPECT_EQ(P.topLeftCorner(12, 12), 0.04 * Eigen::MatrixXd::Identity(12, 12));
+  EXPECT_TRUE(P.topRightCorner(12, map_size).isZero(0.0));
+  EXPECT_TRUE(P.bottomLeftCorner(map_size, 12).isZero(0.0));
+  EXPECT_EQ(P.bottomRightCorner(map_size, map_size),
+            content.covariance.bottomRightCorner(map_size, map_size));
+}
+
+}  // namespace
+}  // namespace active_matching_slam

@@ -1,0 +1,122 @@
+#include "active_matching_slam/map/relocaliser.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <stdexcept>
+
+#include "active_matching_slam/image/corners.h"
+#include "active_matching_slam/simulation/simulator.h"
+
+namespace active_matching_slam {
+namespace {
+
+SimulatorOptions sequence(const std::string& scene) {
+  SimulatorOptions options;
+  options.scene = scene;
+  options.rate_hz = 1.0;
+  options.duration_s = 16.0;
+  return options;
+}
+
+/// Nearest point of the scene on a ray, by the plain formula.
+std::optional<Eigen::Vector3d> castRay(const Scene& scene, const Eigen::Vector3d& from,
+                                       const Eigen::Vector3d& direction) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Surface& surface : scene.surfaces) {
+    const double approach = surface.normal().dot(direction);
+    if (approach >= -1e-9) continue;
+    const double distance = surface.normal().dot(surface.origin - from) / approach;
+    if (distance <= 0.05 || distance >= nearest) continue;
+    const Eigen::Vector3d on_surface = from + distance * direction - surface.origin;
+    const double u = on_surface.dot(surface.u_axis), v = on_surface.dot(surface.v_axis);
+    if (u >= 0.0 && v >= 0.0 && u <= surface.width_m && v <= surface.height_m) nearest = distance;
+  }
+  if (!std::isfinite(nearest)) return std::nullopt;
+  return Eigen::Vector3d(from + nearest * direction);
+}
+
+struct KnownMap {
+  Ekf filter{FilterOptions()};
+  FeatureMap map;
+};
+
+void addFeatures(const Simulator& simulator, const SimulatedFrame& frame, KnownMap* known) {
+  const ImageOptions options;
+  const Eigen::Isometry3d& pose = frame.truth.T_world_camera;
+  for (const Corner& corner : detectCorners(frame.image, {}, 60, 20.0, options)) {
+    const auto patch =
+        extractSourcePatch(frame.image, corner.pixel, pose, options.source_patch_size_px);
+    const auto bearing = simulator.camera().unproject(corner.pixel);
+    if (!patch || !bearing) continue;
+    const auto point = castRay(simulator.scene(), pose.translation(), pose.linear() * *bearing);
+    if (!point) continue;
+    MapFeature feature;
+    feature.id = known->filter.addPointFeature(*point, 1e-4 * Eigen::Matrix3d::Identity());
+    feature.patch = *patch;
+    known->map.add(feature);
+  }
+}
+
+TEST(Relocaliser, FindsTheCameraAlongTheMotionAndNeverAWrongPlace) {
+  Simulator simulator(sequence("room"));
+  const Relocaliser relocaliser(simulator.camera(), RelocaliserOptions(), MapOptions(),
+                                ImageOptions());
+  KnownMap known;
+  int asked = 0, found = 0;
+  double worst = 0.0;
+  while (const auto frame = simulator.next()) {
+    if (frame->index == 0 || frame->index == 4) {
+      addFeatures(simulator, *frame, &known);
+      continue;
+    }
+    if (frame->index < 4) continue;
+    ++asked;
+    const auto place = relocaliser.find(frame->image, known.filter, known.map);
+    if (!place) continue;
+    ++found;
+    const double error =
+        (place->T_world_camera.translation() - frame->truth.T_world_camera.translation()).norm();
+    worst = std::max(worst, error);
+    EXPECT_LT(error, 0.05) << "frame " << frame->index;
+    EXPECT_GE(place->inliers.size(), 10u);
+    EXPECT_LT(place->rms_px, 2.0);
+    if (found == 1) {
+      const auto again = relocaliser.find(frame->image, known.filter, known.map);
+      ASSERT_TRUE(again);
+      EXPECT_EQ(again->T_world_camera.matrix(), place->T_world_camera.matrix());
+    }
+  }
+  RecordProperty("found", found);
+  std::cout << "found " << found << " of " << asked << ", worst error " << worst << " m\n";
+  EXPECT_GE(2 * found, asked);
+
+  for (const char* scene : {"desk", "corridor"}) {
+    SimulatorOptions elsewhere = sequence(scene);
+    elsewhere.duration_s = 3.0;
+    elsewhere.seed = 5;
+    Simulator other(elsewhere);
+    while (const auto frame = other.next())
+      EXPECT_FALSE(relocaliser.find(frame->image, known.filter, known.map))
+          << scene << " " << frame->index;
+  }
+}
+
+TEST(Relocaliser, SaysNothingOfAnEmptyMapOrABlankOrForeignImage) {
+  const CameraModel camera(makeSimulatedCalibration(320, 240, "none"));
+  const Relocaliser relocaliser(camera, RelocaliserOptions(), MapOptions(), ImageOptions());
+  const KnownMap known;
+  EXPECT_FALSE(
+      relocaliser.find(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), known.filter, known.map));
+  EXPECT_FALSE(relocaliser.find(cv::Mat(), known.filter, known.map));
+  EXPECT_FALSE(relocaliser.find(cv::Mat(240, 320, CV_8UC3), known.filter, known.map));
+}
+
+TEST(Relocaliser, RefusesSettingsOutOfRange) {
+  RelocaliserOptions options;
+  options.minimum_inliers = 3;
+  EXPECT_THROW(checkRelocaliserOptions(options), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace active_matching_slam

@@ -1,0 +1,339 @@
+#include "active_matching_slam/tracker/tracker_options.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iomanip>
+#include <limits>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <type_traits>
+
+#include "active_matching_slam/tracker/option_fields.h"
+
+namespace active_matching_slam {
+namespace {
+
+template <class T>
+std::string textOf(const T& value) {
+  std::ostringstream text;
+  text << std::boolalpha << std::setprecision(17) << value;
+  return text.str();
+}
+std::string textOf(UpdateRule rule) { return updateRuleName(rule); }
+
+/// All settings as text, by name.
+using Table = std::map<std::string, std::string>;
+Table tableOf(TrackerOptions options) {
+  Table table;
+  visitOptions(options, [&](const OptionField& field, const auto& value, const auto&...) {
+    EXPECT_TRUE(table.emplace(field.name, textOf(value)).second) << field.name << " comes twice";
+  });
+  return table;
+}
+
+/// Another legal value of every setting.
+struct OtherValue {
+  Table* table;
+  void operator()(const OptionField& f, bool value) { (*table)[f.name] = textOf(!value); }
+  void operator()(const OptionField& f, UpdateRule) { (*table)[f.name] = "thesis"; }
+  void operator()(const OptionField& f, const std::string&) { (*table)[f.name] = "jcbb"; }
+  template <class T>
+  void operator()(const OptionField& f, T value, T minimum, T maximum) {
+    T other;
+    if (std::is_integral_v<T>)  // keeps odd what is odd
+      other = value + 2 <= maximum ? value + 2 : value - 2;
+    else
+      other = value < maximum ? value + (maximum - value) / 16 : minimum;
+    (*table)[f.name] = textOf(other);
+  }
+};
+
+Table otherValues() {
+  Table table;
+  TrackerOptions options;
+  visitOptions(options, OtherValue{&table});
+  return table;
+}
+
+/// Text of values that every number refuses.
+struct RefusedValues {
+  std::vector<std::pair<std::string, std::string>>* list;
+  void operator()(const OptionField&, bool) {}
+  void operator()(const OptionField&, UpdateRule) {}
+  void operator()(const OptionField&, const std::string&) {}
+  template <class T>
+  void operator()(const OptionField& f, T, T minimum, T maximum) {
+    if constexpr (std::is_integral_v<T>) {
+      list->emplace_back(f.name, minimum == 0 ? "-1" : textOf(minimum - 1));
+      list->emplace_back(f.name, textOf(maximum + 1));
+      list->emplace_back(f.name, "2.5");
+    } else {
+      list->emplace_back(f.name, textOf(std::nextafter(minimum, -1e300)));
+      list->emplace_back(f.name, textOf(std::nextafter(maximum, 1e300)));
+      list->emplace_back(f.name, ".inf");
+      list->emplace_back(f.name, "-.inf");
+      list->emplace_back(f.name, ".nan");
+      list->emplace_back(f.name, "nan");
+    }
+  }
+};
+
+std::string writeFile(const std::string& name, const std::string& text) {
+  const std::string path = testing::TempDir() + "/tracker_options_" + name;
+  std::ofstream(path) << text;
+  return path;
+}
+
+std::string asYaml(const std::string& name, const std::string& value) {
+  const auto slash = name.find('/');
+  if (slash == std::string::npos) return name + ": " + value + "\n";
+  return name.substr(0, slash) + ":\n  " + name.substr(slash + 1) + ": " + value + "\n";
+}
+
+/// The message of what `f` throws as E; empty (and a failure) when it does not.
+template <class E, class F>
+std::string messageOf(F f) {
+  try {
+    f();
+  } catch (const E& e) {
+    return e.what();
+  } catch (const std::exception& e) {
+    ADD_FAILURE() << "thrown as another type: " << e.what();
+    return e.what();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return "";
+}
+
+void expectNames(const std::string& message, const std::string& what) {
+  EXPECT_NE(message.find(what), std::string::npos) << "'" << message << "' names '" << what << "'";
+}
+
+TEST(TrackerOptions, DefaultsAreLegal) { EXPECT_NO_THROW(checkTrackerOptions({})); }
+
+TEST(TrackerOptions, EverySettingCanBeSetFromText) {
+  const Table defaults = tableOf({});
+  for (const auto& [name, value] : otherValues()) {
+    TrackerOptions options;
+    ASSERT_NO_THROW(setTrackerOption(name + "=" + value, &options)) << name << "=" << value;
+    Table expected = defaults;
+    EXPECT_NE(expected.at(name), value) << name;
+    expected[name] = value;
+    EXPECT_EQ(tableOf(options), expected) << name;
+  }
+}
+
+TEST(TrackerOptions, EverySettingCanBeSetFromYaml) {
+  const Table defaults = tableOf({});
+  for (const auto& [name, value] : otherValues()) {
+    const std::string path = writeFile("one.yaml", asYaml(name, value));
+    TrackerOptions options;
+    ASSERT_NO_THROW(options = readTrackerOptionsYaml(path)) << name << ": " << value;
+    Table expected = defaults;
+    expected[name] = value;
+    EXPECT_EQ(tableOf(options), expected) << name;
+  }
+}
+
+TEST(TrackerOptions, ValuesOutOfRangeAreRefusedByName) {
+  std::vector<std::pair<std::string, std::string>> refused;
+  TrackerOptions defaults;
+  visitOptions(defaults, RefusedValues{&refused});
+  EXPECT_GT(refused.size(), 100u);
+  for (const auto& [name, value] : refused) {
+    TrackerOptions options;
+    SCOPED_TRACE(name + "=" + value);
+    expectNames(messageOf<std::invalid_argument>(
+                    [&, n = name, v = value] { setTrackerOption(n + "=" + v, &options); }),
+                name);
+    EXPECT_EQ(tableOf(options), tableOf({})) << "nothing is changed";
+    const std::string path = writeFile("refused.yaml", asYaml(name, value));
+    const std::string message =
+        messageOf<std::invalid_argument>([&] { readTrackerOptionsYaml(path); });
+    expectNames(message, name);
+    expectNames(message, path);
+  }
+}
+
+/// Puts NaN into the n-th setting that can hold it.
+struct PutNan {
+  int* n;
+  std::string* name;
+  template <class... Limits>
+  void operator()(const OptionField& field, double& value, Limits...) {
+    if ((*n)-- != 0) return;
+    value = std::numeric_limits<double>::quiet_NaN();
+    *name = field.name;
+  }
+  template <class T, class... Limits>
+  void operator()(const OptionField&, T&, Limits...) {}
+};
+
+TEST(TrackerOptions, NanIsRefusedByName) {
+  for (int i = 0;; ++i) {
+    TrackerOptions options;
+    int n = i;
+    std::string name;
+    visitOptions(options, PutNan{&n, &name});
+    if (name.empty()) {
+      EXPECT_GT(i, 20);
+      break;
+    }
+    expectNames(messageOf<std::invalid_argument>([&] { checkTrackerOptions(options); }), name);
+  }
+}
+
+TEST(TrackerOptions, UnknownSettingsAreNamed) {
+  for (const std::string name :
+       {"matching/prune_wieght", "nonsense", "filters/sigma_px", "matcher/deep"}) {
+    TrackerOptions options;
+    const std::string root = name.substr(0, name.find('/'));
+    expectNames(messageOf<std::invalid_argument>([&] { setTrackerOption(name + "=1", &options); }),
+                root);
+    const std::string path = writeFile("unknown.yaml", asYaml(name, "1"));
+    expectNames(messageOf<std::invalid_argument>([&] { readTrackerOptionsYaml(path); }), root);
+  }
+  TrackerOptions options;
+  expectNames(messageOf<std::invalid_argument>(
+                  [&] { setTrackerOption("matching/prune_wieght=1", &options); }),
+              "matching/prune_wieght");
+}
+
+TEST(TrackerOptions, ValuesOfTheWrongTypeAreNamed) {
+  TrackerOptions options;
+  for (const std::string assignment :
+       {"map/maximum_features=many", "structure=7", "filter/sigma_px=wide",
+        "filter/sigma_px=", "matching/seed=first", "map/maximum_features=1e99"})
+    expectNames(messageOf<std::invalid_argument>([&] { setTrackerOption(assignment, &options); }),
+                assignment.substr(0, assignment.find('=')));
+  for (const std::string text : {"filter:\n  sigma_px: [1, 2]\n", "filter:\n  sigma_px: {a: 1}\n"})
+    expectNames(messageOf<std::invalid_argument>(
+                    [&] { readTrackerOptionsYaml(writeFile("type.yaml", text)); }),
+                "filter/sigma_px");
+  expectNames(messageOf<std::invalid_argument>(
+                  [&] { readTrackerOptionsYaml(writeFile("group.yaml", "filter: 3\n")); }),
+              "filter");
+}
+
+TEST(TrackerOptions, UnknownNamesOfAChoiceAreNamedWithTheChoices) {
+  TrackerOptions options;
+  const std::string matcher =
+      messageOf<std::invalid_argument>([&] { setTrackerOption("matcher=best", &options); });
+  expectNames(matcher, "best");
+  expectNames(matcher, "one_point_ransac");
+  const std::string rule = messageOf<std::invalid_argument>(
+      [&] { setTrackerOption("matching/update_rule=mine", &options); });
+  expectNames(rule, "mine");
+  expectNames(rule, "thesis");
+}
+
+TEST(TrackerOptions, TextWithoutAnEqualsSignIsRefused) {
+  TrackerOptions options;
+  expectNames(messageOf<std::invalid_argument>([&] { setTrackerOption("matcher", &options); }),
+              "name=value");
+}
+
+TEST(TrackerOptions, SettingsThatContradictEachOtherAreNamed) {
+  TrackerOptions options;
+  expectNames(messageOf<std::invalid_argument>(
+                  [&] { setTrackerOption("map/maximum_features=10", &options); }),
+              "map/features_per_frame");
+  expectNames(messageOf<std::invalid_argument>(
+                  [&] { setTrackerOption("image/template_size_px=12", &options); }),
+              "template_size_px");
+}
+
+TEST(TrackerOptions, TheShippedFileHoldsTheDefaults) {
+  // It names every setting, so that what it says is what is read.
+  TrackerOptions others;
+  const Table other_values = otherValues();
+  for (const auto& [name, value] : other_values) setTrackerOption(name + "=" + value, &others);
+  EXPECT_EQ(tableOf(readTrackerOptionsYaml("../config/tracker.yaml", others)), tableOf({}))
+      << "write it anew: parameter_table --tracker-yaml";
+}
+
+TEST(TrackerOptions, AnEmptyFileLeavesTheDefaults) {
+  TrackerOptions defaults;
+  defaults.filter.sigma_px = 1.25;
+  EXPECT_EQ(tableOf(readTrackerOptionsYaml(writeFile("empty.yaml", "# nothing\n"), defaults)),
+            tableOf(defaults));
+}
+
+TEST(TrackerOptions, FilesThatCanNotBeReadAreNamed) {
+  expectNames(messageOf<std::runtime_error>([] { readTrackerOptionsYaml("/nowhere/at.yaml"); }),
+              "/nowhere/at.yaml");
+  for (const std::string text : {"- 1\n- 2\n", "matcher: [unclosed\n", "just text"}) {
+    const std::string path = writeFile("broken.yaml", text);
+    expectNames(messageOf<std::runtime_error>([&] { readTrackerOptionsYaml(path); }), path);
+  }
+}
+
+std::string knownPointsText(const std::string& last_point) {
+  return "points:\n"
+         "  - {position_m: [0, 0, 0], image_px: [10, 20]}\n"
+         "  - {position_m: [0.2, 0, 0], image_px: [110, 20]}\n"
+         "  - {position_m: [0.2, 0.1, 0.01], image_px: [110.5, 80]}\n"
+         "  - " +
+         last_point + "\n";
+}
+
+TEST(KnownPoints, AreReadWithTheirTemplates) {
+  cv::Mat patch(11, 11, CV_8UC1);
+  cv::randu(patch, 0, 256);
+  cv::imwrite(testing::TempDir() + "/tracker_options_patch.png", patch);
+  const auto points = readKnownPointsYaml(writeFile(
+      "points.yaml", knownPointsText("{position_m: [0, 0.1, -1.5e-2], image_px: [10, 80], "
+                                     "template: tracker_options_patch.png}")));
+  ASSERT_EQ(points.size(), 4u);
+  EXPECT_EQ(points[2].position_m, Eigen::Vector3d(0.2, 0.1, 0.01));
+  EXPECT_EQ(points[2].image_px, Eigen::Vector2d(110.5, 80));
+  EXPECT_TRUE(points[2].template_image.empty());
+  EXPECT_EQ(points[3].position_m.z(), -1.5e-2);
+  ASSERT_EQ(points[3].template_image.size(), patch.size());
+  EXPECT_EQ(cv::norm(points[3].template_image, patch, cv::NORM_INF), 0.0);
+}
+
+TEST(KnownPoints, FaultsAreNamed) {
+  expectNames(messageOf<std::runtime_error>([] { readKnownPointsYaml("/nowhere/points.yaml"); }),
+              "/nowhere/points.yaml");
+  const struct {
+    const char* last_point;
+    const char* named;
+  } cases[] = {
+      {"{position_m: [0, 0.1], image_px: [10, 80]}", "points[3].position_m"},
+      {"{position_m: [0, 0.1, 0], image_px: [10, 80, 1]}", "points[3].image_px"},
+      {"{position_m: [0, 0.1, 0]}", "points[3]"},
+      {"{image_px: [10, 80]}", "points[3]"},
+      {"{position_m: here, image_px: [10, 80]}", "points[3]"},
+      {"{position_m: [0, a, 0], image_px: [10, 80]}", "points[3]"},
+      {"{position_m: [0, .nan, 0], image_px: [10, 80]}", "points[3]"},
+      {"{position_m: [0, 0, 0], image_px: [10, .inf]}", "points[3]"},
+      {"{position_m: [0, 0, 0], image_px: [10, 80], template: none.png}", "points[3].template"},
+      {"{position_m: [0, 0, 0], image_px: [10, 80], template: [1]}", "points[3].template"},
+      {"7", "points[3]"}};
+  for (const auto& fault : cases) {
+    SCOPED_TRACE(fault.last_point);
+    const std::string path = writeFile("fault.yaml", knownPointsText(fault.last_point));
+    const std::string message = messageOf<std::runtime_error>([&] { readKnownPointsYaml(path); });
+    expectNames(message, path);
+    expectNames(message, fault.named);
+  }
+  for (const std::string text : {"corners: []\n", "points: 3\n", "- 1\n", "points: [{\n"}) {
+    const std::string path = writeFile("fault.yaml", text);
+    expectNames(messageOf<std::runtime_error>([&] { readKnownPointsYaml(path); }), path);
+  }
+}
+
+TEST(KnownPoints, FewerThanFourAreRefused) {
+  TrackerOptions options;
+  options.known_points.resize(3);
+  const std::string message =
+      messageOf<std::invalid_argument>([&] { checkTrackerOptions(options); });
+  expectNames(message, "known points");
+  expectNames(message, "4");
+}
+
+}  // namespace
+}  // namespace active_matching_slam
