@@ -3,6 +3,13 @@
 if(NOT CATKIN_ENABLE_TESTING)
   return()
 endif()
+# catkin keeps a picture of the environment for tests, and leaves out of it the folders that are not
+# there yet: in a fresh build those of the Python messages. Make them, and take the picture again.
+file(MAKE_DIRECTORY ${CATKIN_DEVEL_PREFIX}/lib
+  ${CATKIN_DEVEL_PREFIX}/${CATKIN_GLOBAL_PYTHON_DESTINATION})
+execute_process(COMMAND ${PYTHON_EXECUTABLE}
+  ${CMAKE_BINARY_DIR}/catkin_generated/generate_cached_setup.py)
+
 add_test(NAME ${PROJECT_NAME}_documents
   COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/documents/documents_test.py)
 set_tests_properties(${PROJECT_NAME}_documents PROPERTIES ENVIRONMENT
