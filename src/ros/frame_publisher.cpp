@@ -21,13 +21,13 @@ void publishIfHeard(const ros::Publisher& publisher, Make make) {
 }  // namespace
 
 template <class Make>
-void FramePublisher::MarkerTopic::publish(Make make) {
+void FramePublisher::MarkerTopic::publish(const std_msgs::Header& header, Make make) {
   const std::uint32_t viewers_now = publisher.getNumSubscribers();
   if (viewers_now > viewers) history.restart();
   viewers = viewers_now;
   if (viewers == 0) return;
   visualization_msgs::MarkerArray markers = make();
-  history.complete(&markers);
+  history.complete(header, &markers);
   publisher.publish(markers);
 }
 
@@ -119,11 +119,12 @@ void FramePublisher::publishMarkers(const TrackedFrame& frame, const FrameContex
                                     const CameraCalibration& calibration,
                                     const TrajectoryLog& trajectory) {
   const std_msgs::Header header = worldHeader(context.stamp);
-  feature_markers_.publish([&] { return featureMarkers(frame, header); });
+  feature_markers_.publish(header, [&] { return featureMarkers(frame, header); });
   information_markers_.publish(
-      [&] { return informationMarkers(frame, options_.draw.minimum_link_bits, header); });
-  submap_markers_.publish([&] { return submapMarkers(frame, options_.submap_level, header); });
-  camera_markers_.publish([&] {
+      header, [&] { return informationMarkers(frame, options_.draw.minimum_link_bits, header); });
+  submap_markers_.publish(header,
+                          [&] { return submapMarkers(frame, options_.submap_level, header); });
+  camera_markers_.publish(header, [&] {
     return cameraMarkers(frame, calibration, trajectory.points(options_.path_length),
                          options_.draw.frustum_m, header);
   });

@@ -306,21 +306,21 @@ MarkerArray cameraMarkers(const TrackedFrame& frame, const CameraCalibration& ca
   return markers;
 }
 
-void MarkerHistory::complete(MarkerArray* markers) {
+void MarkerHistory::complete(const std_msgs::Header& header, MarkerArray* markers) {
   std::set<std::pair<std::string, int>> present;
   for (const Marker& marker : markers->markers) present.insert({marker.ns, marker.id});
+  Marker deletion;
+  deletion.header = header;
   if (restart_) {
-    Marker all;
-    all.action = Marker::DELETEALL;
-    markers->markers.insert(markers->markers.begin(), all);
+    deletion.action = Marker::DELETEALL;
+    markers->markers.insert(markers->markers.begin(), deletion);
   } else {
+    deletion.action = Marker::DELETE;
     for (const auto& [ns, id] : shown_) {
       if (present.count({ns, id})) continue;
-      Marker gone;
-      gone.ns = ns;
-      gone.id = id;
-      gone.action = Marker::DELETE;
-      markers->markers.push_back(gone);
+      deletion.ns = ns;
+      deletion.id = id;
+      markers->markers.push_back(deletion);
     }
   }
   restart_ = false;

@@ -118,6 +118,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     frame->timings_ms.predict = stage.lap();
     measure(image);
     frame->timings_ms.measure = stage.lap();
+    if (options_.structure) observeStructure();
+    frame->timings_ms.structure = stage.lap();
     match(image, frame.get());
     frame->timings_ms.match = stage.lap();
     correct(frame.get());
@@ -126,7 +128,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     maintainMap(image, frame.get());
     frame->timings_ms.map = stage.lap();
     if (options_.structure) updateStructure(frame.get());
-    frame->timings_ms.structure = stage.lap();
+    frame->timings_ms.structure += stage.lap();
   }
   image.copyTo(previous_image_);  // the caller may use its memory again
   frame->state = state_;

@@ -50,6 +50,7 @@ class Tracker::Implementation {
   void lose(const std::string& reason);
   void relocalise(const cv::Mat& image, TrackedFrame* frame);
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
+  void observeStructure();
   void updateStructure(TrackedFrame* frame);
   int startFeatures(const cv::Mat& image, int wanted, TrackedFrame* frame);
   void retire(const std::vector<FeatureId>& ids, TrackedFrame* frame);

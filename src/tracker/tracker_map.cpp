@@ -36,10 +36,24 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   frame->features_started += startFeatures(image, std::min(wanted, kMostStartsPerFrame), frame);
 }
 
-/// Adds the frame to the graph of mutual information. The tree and the submaps of a large map are
-/// made anew every few frames only.
+/// Adds the frame to the graph of mutual information: all that is predicted visible. What was
+/// chosen to be measured is spread over the image, and would leave out the links between
+/// neighbours. It is a prediction of its own, so that whether anyone looks at the graph changes no
+/// bit of the measurements.
+void Tracker::Implementation::observeStructure() {
+  if (prior_.ids.size() == visible_.size()) {
+    structure_.addFrame(prior_.ids, prior_.S);
+    return;
+  }
+  std::vector<FeatureId> ids;
+  for (const VisibleFeature& feature : visible_) ids.push_back(feature.id);
+  const PredictedMeasurements predicted = filter_.predictMeasurements(camera_, ids);
+  structure_.addFrame(predicted.ids, predicted.S);
+}
+
+/// Forgets what has left the map. The tree and the submaps of a large map are made anew every few
+/// frames only.
 void Tracker::Implementation::updateStructure(TrackedFrame* frame) {
-  structure_.addFrame(prior_.ids, prior_.S);
   std::vector<FeatureId> ids;
   for (const MapFeature& feature : map_.features()) ids.push_back(feature.id);
   structure_.keepOnly(ids);

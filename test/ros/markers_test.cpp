@@ -185,17 +185,19 @@ TEST(MarkerHistory, DeletesWhatIsNoMore) {
   TrackedFrame frame;
   frame.features = {pointFeature(1, {0, 0, 1}), pointFeature(2, {1, 0, 1})};
   MarkerArray markers = featureMarkers(frame, worldHeader());
-  history.complete(&markers);
+  history.complete(worldHeader(), &markers);
   EXPECT_EQ(Marker::DELETEALL, markers.markers.front().action);
   frame.features.pop_back();
   markers = featureMarkers(frame, worldHeader());
-  history.complete(&markers);
+  history.complete(worldHeader(), &markers);
   EXPECT_NE(Marker::DELETEALL, markers.markers.front().action);
   ASSERT_TRUE(find(markers, "ellipsoids", 2));
   EXPECT_EQ(Marker::DELETE, find(markers, "ellipsoids", 2)->action);
+  for (const Marker& marker : markers.markers)
+    EXPECT_EQ(worldHeader().stamp, marker.header.stamp) << "what is deleted has a stamp too";
   history.restart();
   markers = featureMarkers(frame, worldHeader());
-  history.complete(&markers);
+  history.complete(worldHeader(), &markers);
   EXPECT_EQ(Marker::DELETEALL, markers.markers.front().action);
 }
 

@@ -56,7 +56,7 @@ class FramePublisher {
     MarkerHistory history;
     std::uint32_t viewers = 0;
     template <class Make>
-    void publish(Make make);
+    void publish(const std_msgs::Header& header, Make make);
   };
 
   void publishPose(const FrameContext& context, const TrajectoryLog& trajectory);

@@ -55,8 +55,9 @@ visualization_msgs::MarkerArray cameraMarkers(const TrackedFrame& frame,
 class MarkerHistory {
  public:
   /// Appends a deletion for each marker sent before and not now; begins with a deletion of all
-  /// after restart(), which also serves a viewer that joins late.
-  void complete(visualization_msgs::MarkerArray* markers);
+  /// after restart(), which also serves a viewer that joins late. Deletions carry the header too: a
+  /// message has one stamp, whatever it says.
+  void complete(const std_msgs::Header& header, visualization_msgs::MarkerArray* markers);
   void restart() { restart_ = true; }
 
  private:
