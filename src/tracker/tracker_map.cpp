@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMostStartsPerFrame = 12;  ///< after the first image
 /// The structure of a map beyond is made anew every few frames only.
-constexpr int kLargeMap = 120, kLargeMapSnapshotFrames = 5;
+constexpr int kLargeMap = 60, kLargeMapSnapshotFrames = 5;
 
 }  // namespace
 
