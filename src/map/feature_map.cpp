@@ -12,6 +12,27 @@ bool byId(const MapFeature& a, FeatureId id) { return a.id < id; }
 
 constexpr double kRateMemory = 0.9;  ///< of the recent rate, a search
 
+constexpr int kLeastMatchesToDrift = 10;
+constexpr std::size_t kLeastFeaturesToCompare = 8;
+constexpr double kMostDrift = 3.5, kMostDriftPx = 0.3;  ///< to the median; and at least
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Eigen::Vector2d medianInnovation(const std::vector<SearchRecord>& searches) {
+  std::vector<double> x, y;
+  for (const SearchRecord& search : searches) {
+    if (!search.matched) continue;
+    x.push_back(search.innovation_px.x());
+    y.push_back(search.innovation_px.y());
+  }
+  return {medianOf(std::move(x)), medianOf(std::move(y))};
+}
+
 }  // namespace
 
 const MapFeature* FeatureMap::find(FeatureId id) const {
@@ -37,6 +58,12 @@ void FeatureMap::retire(const std::vector<FeatureId>& ids) {
 
 void FeatureMap::rescale(double factor) {
   for (MapFeature& feature : features_) feature.patch.T_world_camera.translation() *= factor;
+}
+
+void FeatureMap::movePatches(
+    const std::function<Eigen::Isometry3d(std::int64_t, const Eigen::Isometry3d&)>& moved) {
+  for (MapFeature& feature : features_)
+    feature.patch.T_world_camera = moved(feature.first_frame, feature.patch.T_world_camera);
 }
 
 std::vector<VisibleFeature> FeatureMap::visible(const Ekf& filter, const CameraModel& camera,
@@ -96,6 +123,7 @@ void FeatureMap::record(const std::vector<SearchRecord>& searches, std::int64_t 
   const auto matched = std::count_if(searches.begin(), searches.end(),
                                      [](const SearchRecord& s) { return s.matched; });
   const bool image_at_fault = 3 * matched < static_cast<std::ptrdiff_t>(searches.size());
+  const Eigen::Vector2d common = medianInnovation(searches);
   for (const SearchRecord& search : searches) {
     const auto it = std::lower_bound(features_.begin(), features_.end(), search.id, byId);
     if (it == features_.end() || it->id != search.id) continue;
@@ -106,6 +134,8 @@ void FeatureMap::record(const std::vector<SearchRecord>& searches, std::int64_t 
     if (search.matched) {
       ++it->successes;
       it->last_matched_frame = frame;
+      it->drift_px =
+          kRateMemory * it->drift_px + (1.0 - kRateMemory) * (search.innovation_px - common);
     }
   }
 }
@@ -122,6 +152,20 @@ std::vector<FeatureId> FeatureMap::failing(const MapOptions& options) const {
     if (!feature.known && feature.attempts >= options.retire_after_attempts &&
         (feature.successes < options.retire_success_ratio * feature.attempts ||
          feature.recent_rate < 0.5 * options.retire_success_ratio))
+      ids.push_back(feature.id);
+  return ids;
+}
+
+std::vector<FeatureId> FeatureMap::drifting() const {
+  std::vector<double> lengths;
+  for (const MapFeature& feature : features_)
+    if (feature.successes >= kLeastMatchesToDrift) lengths.push_back(feature.drift_px.norm());
+  if (lengths.size() < kLeastFeaturesToCompare) return {};
+  const double limit = std::max(kMostDrift * medianOf(lengths), kMostDriftPx);
+  std::vector<FeatureId> ids;
+  for (const MapFeature& feature : features_)
+    if (!feature.known && feature.successes >= kLeastMatchesToDrift &&
+        feature.drift_px.norm() > limit)
       ids.push_back(feature.id);
   return ids;
 }

@@ -32,6 +32,7 @@ void Tracker::Implementation::reset(const std::string& reason) {
   state_ = TrackingState::kWaiting;
   reason_ = reason;
   map_.clear();
+  start_adjustment_.end();
   structure_.clear();
   structure_snapshot_ = {};
   filter_.reset(CameraState(), Eigen::Matrix<double, 12, 12>::Zero());
@@ -113,7 +114,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     state_stamp_s_ = stamp_s;
     relocalise(image, frame.get());
   } else if (!frame->repeated_image) {
-    predict(stamp_s - state_stamp_s_);
+    interval_s_ = stamp_s - state_stamp_s_;
+    predict(interval_s_);
     state_stamp_s_ = stamp_s;
     frame->timings_ms.predict = stage.lap();
     measure(image);
@@ -123,6 +125,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     match(image, frame.get());
     frame->timings_ms.match = stage.lap();
     correct(frame.get());
+    if (start_adjustment_.isActive()) adjustStart(frame.get());
     frame->timings_ms.update = stage.lap();
     judge();
     maintainMap(image, frame.get());

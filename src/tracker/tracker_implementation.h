@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "active_matching_slam/filter/start_adjustment.h"
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/information/map_structure.h"
 #include "active_matching_slam/map/feature_map.h"
@@ -42,6 +43,7 @@ class Tracker::Implementation {
   bool accept(const cv::Mat& image, double stamp_s, TrackedFrame* frame);
   void start(const cv::Mat& image, TrackedFrame* frame);
   bool startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame);
+  void adjustStart(TrackedFrame* frame);
   void predict(double interval_s);
   void measure(const cv::Mat& image);
   void match(const cv::Mat& image, TrackedFrame* frame);
@@ -60,6 +62,7 @@ class Tracker::Implementation {
   CameraModel camera_;
   TrackerOptions options_;
   Ekf filter_;
+  StartAdjustment start_adjustment_;
   FeatureMap map_;
   ImageFeatureSearch search_;
   Relocaliser relocaliser_;
@@ -73,6 +76,7 @@ class Tracker::Implementation {
   cv::Mat previous_image_;
   double last_stamp_s_ = 0.0;   ///< of the last image accepted
   double state_stamp_s_ = 0.0;  ///< of the filter's state
+  double interval_s_ = 0.0;     ///< from the state before to this
   double lost_stamp_s_ = 0.0;   ///< when the camera was lost
   std::int64_t images_ = 0;
   int resets_ = 0, times_lost_ = 0, poor_frames_ = 0;

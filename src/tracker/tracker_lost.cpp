@@ -46,6 +46,7 @@ void Tracker::Implementation::lose(const std::string& reason) {
   lost_stamp_s_ = last_stamp_s_;
   poor_frames_ = 0;
   ++times_lost_;
+  start_adjustment_.end();
   CameraState camera = filter_.camera();
   camera.velocity_world.setZero();
   camera.angular_velocity_camera.setZero();
@@ -119,6 +120,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   map_.clear();
   for (const MapFeature& feature : content.map) map_.add(feature);
   scale_source_ = static_cast<ScaleSource>(content.scale_source);
+  start_adjustment_.end();
   structure_.clear();
   structure_snapshot_ = {};
   state_ = TrackingState::kLost;

@@ -23,6 +23,7 @@ void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedF
 void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* frame) {
   frame->features_converted = static_cast<int>(filter_.convertToPoints().size());
   retire(map_.failing(options_.map), frame);
+  retire(map_.drifting(), frame);
   // The maximum may have been lowered.
   retire(map_.leastInformative(filter_, map_.size() - options_.map.maximum_features), frame);
   if (poor_frames_ > 0) return;  // where the camera is unsure, nothing new is put on the map
@@ -100,6 +101,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
   const double sigma = inverse_depth * options_.filter.initial_sigma_inverse_depth /
                        options_.filter.initial_inverse_depth;
   int started = 0;
+  std::vector<FeatureMeasurement> first_sights;
   for (const Corner& corner :
        detectCorners(image, occupied, wanted, options_.map.minimum_distance_px, options_.image)) {
     auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
@@ -108,11 +110,13 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
     MapFeature feature;
     feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth, sigma);
     if (feature.id < 0) continue;
+    first_sights.push_back({feature.id, corner.pixel, 0.0});
     feature.patch = std::move(*patch);
     feature.first_frame = feature.last_matched_frame = frame->index;
     map_.add(std::move(feature));
     ++started;
   }
+  start_adjustment_.addFirstSights(first_sights);
   return started;
 }
 

@@ -107,11 +107,12 @@ void Tracker::Implementation::correct(TrackedFrame* frame) {
   std::size_t next = 0;
   for (int i = 0; i < n; ++i) {
     const bool used = next < fused_.size() && fused_[next].id == prior_.ids[i];
-    if (used) ++next;
+    const Eigen::Vector2d innovation_px =
+        used ? Eigen::Vector2d(fused_[next++].pixel - prior_.mean(i)) : Eigen::Vector2d::Zero();
     const std::int64_t pixels = search_.searchedPixels(i).size();
     if (used || pixels > 0)
-      records.push_back(
-          {prior_.ids[i], used, static_cast<std::int64_t>(search_.matches(i).size()), pixels});
+      records.push_back({prior_.ids[i], used, static_cast<std::int64_t>(search_.matches(i).size()),
+                         pixels, innovation_px});
   }
   map_.record(records, frame->index);
 }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/image/image_quality.h"
 #include "active_matching_slam/tracker/known_start.h"
 #include "tracker_implementation.h"
@@ -35,7 +36,15 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
   }
   visible_.clear();
   frame->features_started += startFeatures(image, options_.map.features_per_frame, frame);
-  if (options_.known_points.empty()) filter_.fixScale(kScaleSigma);
+  start_adjustment_.end();
+  if (options_.known_points.empty()) {
+    filter_.fixScale(kScaleSigma);
+    std::vector<FeatureMeasurement> first;
+    for (const FeatureState& feature : filter_.features())
+      if (const auto projection = projectFeature(camera_, filter_.camera(), feature))
+        first.push_back({feature.id, projection->pixel, 0.0});
+    start_adjustment_.begin(frame->index, first);
+  }
   if (map_.size() < std::max(4, options_.minimum_matches)) {
     state_ = TrackingState::kInitialising;
     reason_ = "only " + std::to_string(map_.size()) + " corners to start from";
@@ -44,6 +53,27 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
   state_ = TrackingState::kTracking;
   reason_.clear();
   poor_frames_ = 0;
+}
+
+/// Lets the first images, taken together, correct what the filter made of them one by one.
+void Tracker::Implementation::adjustStart(TrackedFrame* frame) {
+  start_adjustment_.add(frame->index, interval_s_, filter_.camera(), fused_);
+  const auto adjusted = start_adjustment_.adjust(camera_, filter_);
+  if (!adjusted) return;
+  std::vector<FeatureId> dropped;  // seen too rarely to take part
+  auto kept = adjusted->features.begin();
+  for (const MapFeature& feature : map_.features()) {
+    if (kept != adjusted->features.end() && kept->id == feature.id) {
+      ++kept;
+    } else {
+      dropped.push_back(feature.id);
+    }
+  }
+  retire(dropped, frame);
+  map_.movePatches([&adjusted](std::int64_t image, const Eigen::Isometry3d& T_world_camera) {
+    return adjusted->corrected(image, T_world_camera);
+  });
+  filter_.restore(adjusted->camera, adjusted->features, adjusted->covariance, filter_.nextId());
 }
 
 bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame) {

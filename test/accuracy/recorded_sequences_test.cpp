@@ -120,7 +120,7 @@ TEST_F(RecordedSequences, MoreFeaturesHelp) {
 }
 
 TEST_F(RecordedSequences, ActiveMatchingSearchesAFractionOfTheGates) {
-  const std::vector<std::pair<int, double>> cases = {{1, 4.0}, {2, 7.0}};
+  const std::vector<std::pair<int, double>> cases = {{1, 6.0}, {2, 8.0}};
   for (const auto& [every, ratio] : cases) {
     TrackerOptions options = withMatcher("active");
     options.map.features_per_frame = 11;

@@ -69,7 +69,7 @@ std::vector<double> poseNees(const SimulatedRun& run, double scale) {
 
 class SimulatedSequences : public testing::TestWithParam<std::tuple<const char*, int>> {};
 
-TEST_P(SimulatedSequences, AreTrackedToTheEndWithinFivePercentOfThePath) {
+TEST_P(SimulatedSequences, AreTrackedToTheEndWithinOnePercentOfThePath) {
   const auto [motion, seed] = GetParam();
   const SimulatedRun run = trackSimulation(motion, static_cast<std::uint64_t>(seed));
   EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames)
@@ -80,7 +80,7 @@ TEST_P(SimulatedSequences, AreTrackedToTheEndWithinFivePercentOfThePath) {
   ASSERT_TRUE(alignment);
   const double error = absoluteTrajectoryError(pairs, *alignment);
   const double path = measureExcursion(run.truth).path_length;
-  EXPECT_LT(error, 0.05 * path);
+  EXPECT_LT(error, 0.01 * path);
 
   const auto nees = poseNees(run, alignment->scale);
   ASSERT_EQ(nees.size(),

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/filter/start_adjustment.h"
 #include "filter/example_filter.h"
 
 namespace active_matching_slam {
@@ -67,6 +68,7 @@ class Simulation {
       measurements.push_back({feature.id, *pixel + noise(), options_.sigma_px});
     }
     const UpdateReport report = filter_.update(model_, measurements);
+    adjustStart(dt, measurements);
     SimulatedFrame frame = judge();
     frame.measured = report.used;
     frame.nis = report.nis / std::max(1, 2 * report.used);
@@ -112,6 +114,13 @@ class Simulation {
     return sum;
   }
 
+  void adjustStart(double dt, const std::vector<FeatureMeasurement>& measurements) {
+    start_adjustment_.add(++frame_, dt, filter_.camera(), measurements);
+    const auto adjusted = start_adjustment_.adjust(model_, filter_);
+    if (adjusted)
+      filter_.restore(adjusted->camera, adjusted->features, adjusted->covariance, filter_.nextId());
+  }
+
   void setHandHeldTruth() {
     const auto rotationAt = [this](double time) {
       const double kept = time_;
@@ -125,6 +134,13 @@ class Simulation {
     truth_.q_world_camera = rotationAt(time_);
     truth_.angular_velocity_camera =
         vectorFromRotation(rotationAt(time_ - 1e-4).conjugate() * rotationAt(time_ + 1e-4)) / 2e-4;
+    if (options_.metric) return;
+    // Without a target the world begins where the camera does.
+    if (time_ == 0.0) origin_ = truth_;
+    const Eigen::Quaterniond q_start_world = origin_.q_world_camera.conjugate();
+    truth_.position_world = q_start_world * (truth_.position_world - origin_.position_world);
+    truth_.velocity_world = q_start_world * truth_.velocity_world;
+    truth_.q_world_camera = q_start_world * truth_.q_world_camera;
   }
 
   void move(double dt) {
@@ -200,6 +216,13 @@ class Simulation {
       const FeatureId id = filter_.addInverseDepthFeature(model_, pixels[i] + noise());
       if (id >= 0) points_[id] = truth_.poseWorldCamera() * (*model_.unproject(pixels[i]) / rho);
     }
+    if (fix_scale) {
+      std::vector<FeatureMeasurement> first;
+      for (const FeatureState& feature : filter_.features())
+        first.push_back(
+            {feature.id, projectFeature(model_, filter_.camera(), feature)->pixel, 0.0});
+      start_adjustment_.begin(0, first);
+    }
     // The unit of length is what makes the mean inverse depth of the first features the expected
     // one.
     if (fix_scale) filter_.fixScale(1e-4);
@@ -242,8 +265,10 @@ class Simulation {
   CameraModel model_;
   Random random_;
   Ekf filter_;
-  CameraState truth_;
+  StartAdjustment start_adjustment_;
+  CameraState truth_, origin_;
   double time_ = 0.0;
+  int frame_ = 0;
   Wave waves_[6][3];
   std::map<FeatureId, Eigen::Vector3d> points_;
   FeatureId known_ = 0;

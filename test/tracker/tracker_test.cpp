@@ -16,7 +16,7 @@ namespace {
 
 /// Largest error of a short film at 320 x 240, over the path. A slow start from rest leaves translation
 /// and rotation hard to tell apart, which dominates it.
-constexpr double kShareOfPath = 0.1;
+constexpr double kShareOfPath = 0.02;
 
 Tracker slowTracker(const TrackerOptions& options = {}) {
   return Tracker(slowFilm().camera, options);
@@ -373,7 +373,7 @@ TEST(Tracker, TracksOnInTheNewScale) {
     matched_scaled += scaled[i]->nis_degrees / 2;
     matched_unscaled += unscaled[i]->nis_degrees / 2;
   }
-  EXPECT_GT(matched_scaled, 0.97 * matched_unscaled) << "first views are scaled too";
+  EXPECT_GT(matched_scaled, 0.9 * matched_unscaled) << "first views are scaled too";
   const PathFit one = fitPath(film, scaled, 90), other = fitPath(film, unscaled, 90);
   EXPECT_NEAR(one.scale * factor / other.scale, 1.0, 0.02);
   EXPECT_LT(one.rms_m, kShareOfPath * one.path_m);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "active_matching_slam/camera/camera_model.h"
@@ -23,6 +24,8 @@ struct MapFeature {
   int successes = 0;            ///< of these, frames in which its match was accepted
   double recent_rate = 1.0;     ///< successes a search, averaged over about the last ten
   FeatureRateStatistics rates;  ///< learnt for the matchers
+  /// Innovation less the frame's median, averaged over about the last ten matches [px].
+  Eigen::Vector2d drift_px = Eigen::Vector2d::Zero();
   std::int64_t first_frame = 0;
   std::int64_t last_matched_frame = 0;
 };
@@ -39,6 +42,7 @@ struct SearchRecord {
   bool matched = false;      ///< its match was accepted
   std::int64_t matches = 0;  ///< met in all, the accepted one included
   std::int64_t pixels = 0;   ///< searched
+  Eigen::Vector2d innovation_px = Eigen::Vector2d::Zero();  ///< of the accepted match
 };
 
 /// Which features exist and which are looked for. Means and covariances are the filter's; the two
@@ -56,6 +60,9 @@ class FeatureMap {
   void retire(const std::vector<FeatureId>& ids);
   /// Multiplies all lengths by `factor` > 0, as the filter has been told to.
   void rescale(double factor);
+  /// Puts the camera of each feature's first sight at `moved(first_frame, T_world_camera)`.
+  void movePatches(
+      const std::function<Eigen::Isometry3d(std::int64_t, const Eigen::Isometry3d&)>& moved);
 
   /// Features predicted in front of the camera, inside the image less `border_px`, and neither too
   /// oblique nor too different in size from first sight. Ascending id.
@@ -76,6 +83,10 @@ class FeatureMap {
 
   /// Features that fail too often.
   std::vector<FeatureId> failing(const MapOptions& options) const;
+
+  /// Features that are no points of the scene, such as corners where something near hides something
+  /// far: their matches leave the prediction always to one side, by far more than others do.
+  std::vector<FeatureId> drifting() const;
 
   /// The `count` features that inform least about the camera's present and near surroundings: those
   /// whose first view is furthest from the present one, in direction and, in units of their depth,

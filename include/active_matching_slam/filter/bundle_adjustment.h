@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "active_matching_slam/camera/camera_model.h"
+#include "active_matching_slam/filter/camera_state.h"
+#include "active_matching_slam/filter/feature_state.h"
+
+namespace active_matching_slam {
+
+/// An image point of a feature, by the feature's place in Bundle::features.
+struct BundleObservation {
+  int feature = -1;
+  Eigen::Vector2d pixel;
+};
+
+/// Cameras and features to be adjusted together. The first camera is the world: it stays at the
+/// origin, and every feature is anchored there (inverse depth).
+struct Bundle {
+  std::vector<CameraState> cameras;  ///< of velocities nothing is read or changed
+  std::vector<FeatureState> features;
+  std::vector<std::vector<BundleObservation>> observations;  ///< one list a camera
+};
+
+struct BundleOptions {
+  double sigma_px = 0.5;             ///< of an image point, per axis
+  double outlier_px = 1.25;          ///< image points much further off count for little
+  double inverse_depth = 1.0;        ///< prior mean of every inverse depth; it sets the scale
+  double sigma_inverse_depth = 0.5;  ///< and its standard deviation
+  double minimum_inverse_depth = 1e-4;
+  int max_iterations = 20;
+};
+
+/// Levenberg-Marquardt over all cameras but the first, all bearings and inverse depths, the
+/// features eliminated first (Triggs et al. 1999, section 6.1), image points weighted by Cauchy's
+/// function. Returns the cost reached: minus twice the logarithm of the posterior, up to a
+/// constant.
+double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle);
+
+/// Covariance at a minimum, first order, of the cameras from `first_camera` on (position and
+/// rotation, 6 each, as in CameraError) and then of all features (bearing and inverse depth, 3
+/// each). Scale is taken as known to `relative_scale_sigma`: the mean logarithm of the inverse
+/// depths is the unit.
+Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
+                                 const Bundle& bundle, int first_camera,
+                                 double relative_scale_sigma);
+
+/// Root mean square [px], per axis, of what image points miss of each feature's projections.
+std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle);
+
+/// The reading of the same images with near and far exchanged, which a narrow view or little
+/// parallax can hardly tell from the first (the bas-relief ambiguity; Belhumeur et al. 1999):
+/// inverse depths mirrored at their mean, the camera's path reversed, turned to fit.
+void reverseDepths(const CameraModel& model, Bundle* bundle);
+
+/// Turns camera `index` so that the observed rays fit the features as seen from its place.
+void alignRotation(const CameraModel& model, int index, Bundle* bundle);
+
+}  // namespace active_matching_slam

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "active_matching_slam/camera/camera_model.h"
+#include "active_matching_slam/filter/bundle_adjustment.h"
+#include "active_matching_slam/filter/ekf.h"
+
+namespace active_matching_slam {
+
+/// State of a filter made from the first images together, for Ekf::restore().
+struct AdjustedStart {
+  CameraState camera;
+  std::vector<FeatureState> features;  ///< ascending id
+  Eigen::MatrixXd covariance;
+  /// Where a camera of the start was taken to be, and where it was.
+  struct Move {
+    std::int64_t image = 0;
+    Eigen::Isometry3d T_world_camera_before, T_world_camera_after;
+  };
+  std::vector<Move> moves;  ///< of some of the images, ascending
+
+  /// Pose of a camera near one of the moves' by the same correction.
+  Eigen::Isometry3d corrected(std::int64_t image, const Eigen::Isometry3d& T_world_camera) const;
+};
+
+/// Start with free scale. A filter linearises the first images about depths that it can only guess,
+/// and can't take back what it made of them: a turn read as a move, near and far exchanged. So the
+/// matches of the first images are kept, and when they show parallax, cameras and depths are
+/// adjusted together, from what the filter believes and from its opposites; the best, if it is
+/// clearly the best, becomes the filter's state. Repeated as the parallax grows, until depths are
+/// known well enough to be followed linearly.
+class StartAdjustment {
+ public:
+  /// Starts anew with image `index`: `first` is where it shows the filter's features; its camera is
+  /// the world's origin.
+  void begin(std::int64_t index, const std::vector<FeatureMeasurement>& first);
+  void end() { is_active_ = false; }
+  bool isActive() const { return is_active_; }
+
+  /// Keeps the matches of image `index`, taken `interval_s` after the one before; `camera` is what
+  /// the filter made of it.
+  void add(std::int64_t index, double interval_s, const CameraState& camera,
+           const std::vector<FeatureMeasurement>& measurements);
+
+  /// Joins to the last image features that it showed first, numbered above all before.
+  void addFirstSights(const std::vector<FeatureMeasurement>& measurements);
+
+  /// The adjusted state when it is time for one and the images leave no doubt.
+  std::optional<AdjustedStart> adjust(const CameraModel& model, const Ekf& filter);
+
+ private:
+  struct Image {
+    std::int64_t index = 0;
+    double interval_s = 0.0;
+    CameraState camera;
+    std::vector<FeatureMeasurement> measurements;  ///< ascending id
+  };
+
+  void thinOut();
+  std::optional<double> parallaxToFirst(const CameraModel& model, const Image& image) const;
+  Bundle makeBundle(const Ekf& filter, std::vector<FeatureId>* ids) const;
+  std::optional<AdjustedStart> makeState(const CameraModel& model, const Ekf& filter,
+                                         const BundleOptions& options, const Bundle& bundle,
+                                         const std::vector<FeatureId>& ids) const;
+
+  bool is_active_ = false;
+  std::vector<Image> images_;  ///< the first, some between, the last two
+  double least_motion_px_ = 1.0;
+  double next_parallax_px_ = 0.0;
+};
+
+}  // namespace active_matching_slam

@@ -1,0 +1,337 @@
+#include "active_matching_slam/filter/start_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "active_matching_slam/filter/rotation.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Parallax to the first image [px]: adjusted first at, then whenever it has grown by a factor, and
+/// no more beyond.
+constexpr double kFirstParallaxPx = 0.5, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
+constexpr double kGrowthInDoubt = 1.25;    ///< the factor when the images leave a doubt
+constexpr std::size_t kMostImages = 48;    ///< kept
+constexpr std::size_t kLeastPoints = 8;    ///< of an image that takes part, and common to the first
+constexpr int kLeastSightings = 3;         ///< of a feature that takes part
+constexpr double kLeastCostGap = 12.0;     ///< to the next reading; odds of e^6
+constexpr double kMostCostPerPoint = 4.0;  ///< of 2 expected: beyond, things move or matches lie
+constexpr double kLeastNoiseShare =
+    0.05;  ///< of the assumed variance that images are credited with
+constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
+constexpr double kSameDirection = 0.8;  ///< cosine between two readings' moves that are one
+constexpr double kScaleSigma = 1e-3;    ///< of the free unit, relative
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+const FeatureMeasurement* find(const std::vector<FeatureMeasurement>& measurements, FeatureId id) {
+  const auto it =
+      std::lower_bound(measurements.begin(), measurements.end(), id,
+                       [](const FeatureMeasurement& m, FeatureId i) { return m.id < i; });
+  return it != measurements.end() && it->id == id ? &*it : nullptr;
+}
+
+/// Median length [px] of the way of the points seen in both.
+double medianMotion(const std::vector<FeatureMeasurement>& a,
+                    const std::vector<FeatureMeasurement>& b) {
+  std::vector<double> lengths;
+  for (const FeatureMeasurement& m : a)
+    if (const FeatureMeasurement* same = find(b, m.id))
+      lengths.push_back((m.pixel - same->pixel).norm());
+  return medianOf(std::move(lengths));
+}
+
+bool isSameReading(const Bundle& a, const Bundle& b) {
+  const Eigen::Vector3d& x = a.cameras.back().position_world;
+  const Eigen::Vector3d& y = b.cameras.back().position_world;
+  return x.dot(y) > kSameDirection * x.norm() * y.norm();
+}
+
+/// The same feature, anchored at the origin.
+FeatureState seenFromOrigin(const FeatureState& feature) {
+  FeatureState seen = feature;
+  const Eigen::Vector3d ray = feature.inverse_depth * feature.anchor_world + feature.bearing_world;
+  seen.anchor_world.setZero();
+  seen.bearing_world = ray.normalized();
+  seen.inverse_depth = feature.inverse_depth / ray.norm();
+  const Eigen::Vector3d& m = seen.bearing_world;
+  const Eigen::Vector3d axis =
+      std::abs(m.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  seen.tangent_world = (axis - m * m.dot(axis)).normalized();
+  return seen;
+}
+
+/// All at one depth, and cameras that only turned.
+void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle) {
+  for (FeatureState& feature : bundle->features) feature.inverse_depth = inverse_depth;
+  for (std::size_t k = 1; k < bundle->cameras.size(); ++k) {
+    bundle->cameras[k].position_world.setZero();
+    alignRotation(model, static_cast<int>(k), bundle);
+  }
+}
+
+void rescale(double factor, Bundle* bundle) {
+  for (FeatureState& feature : bundle->features) feature.inverse_depth /= factor;
+  for (CameraState& camera : bundle->cameras) camera.position_world *= factor;
+}
+
+/// Scales the bundle to a median inverse depth.
+void normalise(double inverse_depth, Bundle* bundle) {
+  std::vector<double> values;
+  for (const FeatureState& feature : bundle->features) values.push_back(feature.inverse_depth);
+  if (!values.empty()) rescale(medianOf(std::move(values)) / inverse_depth, bundle);
+}
+
+/// Scales the bundle to the unit of length of `before`: the median of the inverse depths stays.
+void keepUnit(const Bundle& before, Bundle* bundle) {
+  std::vector<double> logarithms;
+  for (std::size_t i = 0; i < bundle->features.size(); ++i)
+    logarithms.push_back(
+        std::log(bundle->features[i].inverse_depth / before.features[i].inverse_depth));
+  rescale(std::exp(medianOf(std::move(logarithms))), bundle);
+}
+
+/// Takes out features that are no points of the scene: their image points are outliers on the
+/// whole. Both bundles have the same features and observations.
+void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, Bundle* before,
+                   std::vector<FeatureId>* ids) {
+  const std::vector<double> errors = featureErrors(model, *bundle);
+  std::vector<int> place(errors.size(), -1);
+  int kept = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (errors[i] > outlier_px) continue;
+    place[i] = kept;
+    bundle->features[kept] = bundle->features[i];
+    before->features[kept] = before->features[i];
+    (*ids)[kept++] = (*ids)[i];
+  }
+  bundle->features.resize(kept);
+  before->features.resize(kept);
+  ids->resize(kept);
+  for (auto& observations : bundle->observations) {
+    std::vector<BundleObservation> remaining;
+    for (const BundleObservation& o : observations)
+      if (place[o.feature] >= 0) remaining.push_back({place[o.feature], o.pixel});
+    observations.swap(remaining);
+  }
+}
+
+}  // namespace
+
+Eigen::Isometry3d AdjustedStart::corrected(std::int64_t image,
+                                           const Eigen::Isometry3d& T_world_camera) const {
+  const auto nearest =
+      std::min_element(moves.begin(), moves.end(), [image](const Move& a, const Move& b) {
+        return std::abs(a.image - image) < std::abs(b.image - image);
+      });
+  if (nearest == moves.end()) return T_world_camera;
+  return nearest->T_world_camera_after * nearest->T_world_camera_before.inverse() * T_world_camera;
+}
+
+void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasurement>& first) {
+  is_active_ = true;
+  images_.assign(1, {index, 0.0, CameraState(), first});
+  least_motion_px_ = 1.0;
+  next_parallax_px_ = kFirstParallaxPx;
+}
+
+void StartAdjustment::addFirstSights(const std::vector<FeatureMeasurement>& measurements) {
+  if (!is_active_ || images_.empty()) return;
+  auto& known = images_.back().measurements;
+  known.insert(known.end(), measurements.begin(), measurements.end());
+}
+
+void StartAdjustment::add(std::int64_t index, double interval_s, const CameraState& camera,
+                          const std::vector<FeatureMeasurement>& measurements) {
+  if (!is_active_) return;
+  images_.push_back({index, interval_s, camera, measurements});
+  thinOut();
+}
+
+/// The last image but two goes when it shows nothing new; all but every other go when there are too
+/// many.
+void StartAdjustment::thinOut() {
+  const std::size_t n = images_.size();
+  if (n >= 4 &&
+      (images_[n - 3].measurements.size() < kLeastPoints ||
+       medianMotion(images_[n - 3].measurements, images_[n - 4].measurements) < least_motion_px_)) {
+    images_.erase(images_.end() - 3);
+  }
+  if (images_.size() <= kMostImages) return;
+  least_motion_px_ *= 2.0;
+  std::vector<Image> kept;
+  for (std::size_t i = 0; i < images_.size(); ++i)
+    if (i % 2 == 0 || i + 2 >= images_.size()) kept.push_back(std::move(images_[i]));
+  images_ = std::move(kept);
+}
+
+/// Median angle [px] to the first image that no turn explains. Empty when they share too little.
+std::optional<double> StartAdjustment::parallaxToFirst(const CameraModel& model,
+                                                       const Image& image) const {
+  Bundle pair;
+  pair.cameras.resize(2);
+  pair.observations.resize(2);
+  for (const FeatureMeasurement& m : image.measurements) {
+    const FeatureMeasurement* first = find(images_.front().measurements, m.id);
+    const auto ray = first ? model.unproject(first->pixel) : std::nullopt;
+    if (!ray) continue;
+    FeatureState feature;
+    feature.bearing_world = ray->normalized();
+    pair.observations[1].push_back({static_cast<int>(pair.features.size()), m.pixel});
+    pair.features.push_back(feature);
+  }
+  if (pair.features.size() < kLeastPoints) return std::nullopt;
+  alignRotation(model, 1, &pair);
+  const Eigen::Matrix3d R = pair.cameras[1].q_world_camera.toRotationMatrix();
+  std::vector<double> angles;
+  for (const BundleObservation& o : pair.observations[1])
+    if (const auto ray = model.unproject(o.pixel))
+      angles.push_back((R * ray->normalized() - pair.features[o.feature].bearing_world).norm());
+  return medianOf(std::move(angles)) * model.calibration().fx;
+}
+
+Bundle StartAdjustment::makeBundle(const Ekf& filter, std::vector<FeatureId>* ids) const {
+  Bundle bundle;
+  for (const FeatureState& feature : filter.features()) {
+    const auto sightings = std::count_if(
+        images_.begin(), images_.end(),
+        [&feature](const Image& image) { return find(image.measurements, feature.id) != nullptr; });
+    if (sightings < kLeastSightings || feature.kind != FeatureKind::kInverseDepth) continue;
+    ids->push_back(feature.id);
+    bundle.features.push_back(seenFromOrigin(feature));
+  }
+  for (const Image& image : images_) {
+    bundle.cameras.push_back(image.camera);
+    bundle.observations.emplace_back();
+    for (const FeatureMeasurement& m : image.measurements) {
+      const auto it = std::lower_bound(ids->begin(), ids->end(), m.id);
+      if (it != ids->end() && *it == m.id)
+        bundle.observations.back().push_back({static_cast<int>(it - ids->begin()), m.pixel});
+    }
+  }
+  return bundle;
+}
+
+std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, const Ekf& filter) {
+  if (!is_active_ || images_.size() < 4) return std::nullopt;
+  const auto parallax = parallaxToFirst(model, images_.back());
+  if (parallax && *parallax < next_parallax_px_) return std::nullopt;
+  if (!parallax || *parallax >= kLastParallaxPx) end();
+
+  std::vector<FeatureId> ids;
+  Bundle believed = makeBundle(filter, &ids);
+  std::size_t points = 0;
+  for (const auto& observations : believed.observations) {
+    if (observations.size() < kLeastPoints) return std::nullopt;
+    points += observations.size();
+  }
+  BundleOptions options;
+  options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
+  options.sigma_px = filter.options().sigma_px;
+  options.inverse_depth = filter.options().initial_inverse_depth;
+  options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
+  options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
+
+  std::vector<Bundle> readings{believed, believed};
+  normalise(options.inverse_depth, &readings[0]);  // a known scale may have been set
+  flatten(model, options.inverse_depth, &readings[1]);
+  std::vector<double> costs;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (i >= 2) {
+      if (i == 3 && isSameReading(readings[0], readings[1])) break;
+      readings.push_back(readings[i - 2]);
+      reverseDepths(model, &readings.back());
+    }
+    costs.push_back(adjustBundle(model, options, &readings[i]));
+  }
+  const auto best =
+      static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  // Images are often better than assumed.
+  const double noise =
+      std::clamp(costs[best] / (2.0 * static_cast<double>(points)), kLeastNoiseShare, 1.0);
+  bool in_doubt = costs[best] > kMostCostPerPoint * static_cast<double>(points);
+  for (std::size_t i = 0; i < costs.size(); ++i)
+    in_doubt |= costs[i] < costs[best] + kLeastCostGap * noise &&
+                !isSameReading(readings[i], readings[best]);
+  if (parallax) next_parallax_px_ = (in_doubt ? kGrowthInDoubt : kParallaxGrowth) * *parallax;
+  if (in_doubt) return std::nullopt;
+
+  // Corners where something near hides something far wander by less than would make them outliers;
+  // most image points are much better than that.
+  const double equations = 2.0 * static_cast<double>(points);
+  const double unknowns =
+      3.0 * static_cast<double>(ids.size()) + 6.0 * static_cast<double>(images_.size() - 1);
+  const double freedom = std::max(equations - unknowns, 0.1 * equations);
+  const double scale =
+      medianOf(featureErrors(model, readings[best])) * std::sqrt(equations / freedom);
+  options.outlier_px =
+      std::clamp(kOutlierSigmas * scale, kLeastOutlierPx, kOutlierSigmas * options.sigma_px);
+  BundleOptions fine = options;
+  fine.sigma_px = options.outlier_px / kOutlierSigmas;
+  adjustBundle(model, fine, &readings[best]);
+  dropWanderers(model, options.outlier_px, &readings[best], &believed, &ids);
+  keepUnit(believed, &readings[best]);
+  options.sigma_px = std::min(options.sigma_px, fine.sigma_px);
+  auto start = makeState(model, filter, options, readings[best], ids);
+  if (!start) return std::nullopt;
+  for (std::size_t k = 0; k < images_.size(); ++k) {
+    start->moves.push_back({images_[k].index, images_[k].camera.poseWorldCamera(),
+                            readings[best].cameras[k].poseWorldCamera()});
+    images_[k].camera = readings[best].cameras[k];
+  }
+  return start;
+}
+
+std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model, const Ekf& filter,
+                                                        const BundleOptions& options,
+                                                        const Bundle& bundle,
+                                                        const std::vector<FeatureId>& ids) const {
+  const int last = static_cast<int>(bundle.cameras.size()) - 1;
+  const double dt = images_.back().interval_s;
+  const Eigen::MatrixXd joint = bundleCovariance(model, options, bundle, last - 1, kScaleSigma);
+  if (joint.size() == 0 || !joint.allFinite() || !(dt > 0.0)) return std::nullopt;
+
+  AdjustedStart start;
+  start.camera = bundle.cameras[last];
+  const CameraState& before = bundle.cameras[last - 1];
+  start.camera.velocity_world = (start.camera.position_world - before.position_world) / dt;
+  start.camera.angular_velocity_camera =
+      vectorFromRotation(before.q_world_camera.conjugate() * start.camera.q_world_camera) / dt;
+
+  const int F = static_cast<int>(ids.size());
+  const int size = CameraError::kSize + 6 * F;
+  // Rows: the filter's error; columns: cameras before last and last, then the features.
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(size, joint.cols());
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d R_camera_world = start.camera.q_world_camera.toRotationMatrix().transpose();
+  J.block<3, 3>(CameraError::kPosition, 6) = I;
+  J.block<3, 3>(CameraError::kRotation, 9) = I;
+  J.block<3, 3>(CameraError::kVelocity, 0) = -I / dt;
+  J.block<3, 3>(CameraError::kVelocity, 6) = I / dt;
+  J.block<3, 3>(CameraError::kAngularVelocity, 3) = -R_camera_world / dt;
+  J.block<3, 3>(CameraError::kAngularVelocity, 9) = R_camera_world / dt;
+  for (int i = 0; i < F; ++i) {
+    FeatureState feature = bundle.features[i];
+    feature.id = ids[i];
+    feature.offset = CameraError::kSize + 6 * i;
+    J.block<3, 3>(feature.offset + FeatureError::kBearing, 12 + 3 * i) = I;
+    start.features.push_back(feature);
+  }
+  start.covariance = J * joint * J.transpose();
+  start.covariance = 0.5 * (start.covariance + start.covariance.transpose()).eval();
+  const FilterOptions& noise = filter.options();
+  start.covariance.diagonal().segment<3>(CameraError::kVelocity).array() +=
+      std::pow(noise.sigma_acceleration_mps2 * dt, 2);
+  start.covariance.diagonal().segment<3>(CameraError::kAngularVelocity).array() +=
+      std::pow(noise.sigma_angular_acceleration_rps2 * dt, 2);
+  return start;
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,191 @@
+#include "active_matching_slam/filter/bundle_adjustment.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "filter/example_bundle.h"
+
+namespace active_matching_slam {
+namespace {
+
+BundleOptions weakPrior() {
+  BundleOptions options;
+  options.sigma_inverse_depth = 3.0;
+  return options;
+}
+
+/// All features at one depth and no camera moved: what is known before anything is.
+Bundle withoutKnowledge(Bundle bundle) {
+  for (FeatureState& feature : bundle.features) feature.inverse_depth = 1.0;
+  for (CameraState& camera : bundle.cameras) camera = CameraState();
+  return bundle;
+}
+
+TEST(BundleAdjustment, FindsPathAndDepthsUpToScaleFromNothing) {
+  const CameraModel model(exampleCalibration());
+  const Bundle truth = exampleBundle(model, 8, 40, 0.05, 0.0, 1);
+  Bundle bundle = withoutKnowledge(truth);
+  const double cost = adjustBundle(model, weakPrior(), &bundle);
+  EXPECT_LT(cost, 5.0);  // of the prior
+  const double scale =
+      bundle.cameras.back().position_world.norm() / truth.cameras.back().position_world.norm();
+  for (std::size_t k = 1; k < truth.cameras.size(); ++k) {
+    EXPECT_LT((bundle.cameras[k].position_world - scale * truth.cameras[k].position_world).norm(),
+              0.02 * scale * truth.cameras[k].position_world.norm())
+        << k;
+    EXPECT_LT(bundle.cameras[k].q_world_camera.angularDistance(truth.cameras[k].q_world_camera),
+              2e-3)
+        << k;
+  }
+  for (std::size_t i = 0; i < truth.features.size(); ++i)
+    EXPECT_NEAR(bundle.features[i].inverse_depth * scale, truth.features[i].inverse_depth, 0.05)
+        << i;
+  for (const double error : featureErrors(model, bundle)) EXPECT_LT(error, 0.02);
+}
+
+TEST(BundleAdjustment, StopsWhereNoParameterCanLowerTheCost) {
+  const CameraModel model(exampleCalibration());
+  const BundleOptions options = weakPrior();
+  Bundle bundle = withoutKnowledge(exampleBundle(model, 6, 30, 0.05, 0.5, 2));
+  BundleOptions thorough = options;
+  thorough.max_iterations = 200;
+  double cost = adjustBundle(model, thorough, &bundle);
+  for (int again = 0; again < 20; ++again) cost = adjustBundle(model, thorough, &bundle);
+  BundleOptions evaluate = options;
+  evaluate.max_iterations = 0;
+  const auto rise = [&](auto change) {
+    Bundle moved = bundle;
+    change(moved);
+    return adjustBundle(model, evaluate, &moved) - cost;
+  };
+  for (std::size_t k = 1; k < bundle.cameras.size(); ++k) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double sign : {-1.0, 1.0}) {
+        const Eigen::Vector3d d = sign * 1e-3 * Eigen::Vector3d::Unit(axis);
+        EXPECT_GT(rise([&](Bundle& b) { b.cameras[k].position_world += d; }), 0.0);
+        EXPECT_GT(rise([&](Bundle& b) {
+                    b.cameras[k].q_world_camera =
+                        rotationFromVector(d) * b.cameras[k].q_world_camera;
+                  }),
+                  0.0);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < bundle.features.size(); ++i)
+    for (const double sign : {-1.0, 1.0})
+      EXPECT_GT(rise([&](Bundle& b) { b.features[i].inverse_depth += sign * 0.02; }), 0.0) << i;
+}
+
+TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
+  const CameraModel model(exampleCalibration());
+  BundleOptions options = weakPrior();
+  options.outlier_px = 1e6;
+  const Bundle bundle = exampleBundle(model, 4, 12, 0.1, 0.0, 3);
+  const int cameras = 3, features = 12, size = 6 * cameras + 3 * features;
+  const auto moved = [&](int parameter, double step) {
+    Bundle b = bundle;
+    if (parameter < 6 * cameras) {
+      CameraState& camera = b.cameras[1 + parameter / 6];
+      const Eigen::Vector3d d = step * Eigen::Vector3d::Unit(parameter % 3);
+      if (parameter % 6 < 3) {
+        camera.position_world += d;
+      } else {
+        camera.q_world_camera = rotationFromVector(d) * camera.q_world_camera;
+      }
+      return b;
+    }
+    FeatureState& f = b.features[(parameter - 6 * cameras) / 3];
+    const int which = (parameter - 6 * cameras) % 3;
+    if (which == 2) {
+      f.inverse_depth += step;
+    } else {
+      f.bearing_world = (f.bearing_world + step * f.tangentBasis().col(which)).normalized();
+    }
+    return b;
+  };
+  const auto pixels = [&](const Bundle& b) {
+    std::vector<double> values;
+    for (std::size_t k = 0; k < b.cameras.size(); ++k)
+      for (const BundleObservation& o : bundle.observations[k]) {
+        const Eigen::Vector2d z = projectFeature(model, b.cameras[k], b.features[o.feature])->pixel;
+        values.insert(values.end(), {z.x(), z.y()});
+      }
+    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(values.data(), values.size()));
+  };
+  Eigen::MatrixXd J(pixels(bundle).size(), size);
+  for (int p = 0; p < size; ++p)
+    J.col(p) = (pixels(moved(p, 1e-6)) - pixels(moved(p, -1e-6))) / 2e-6;
+  Eigen::MatrixXd information = J.transpose() * J / (options.sigma_px * options.sigma_px);
+  const double scale_sigma = 0.01;
+  Eigen::VectorXd scale = Eigen::VectorXd::Zero(size);
+  for (int i = 0; i < features; ++i) {
+    const int row = 6 * cameras + 3 * i + 2;
+    information(row, row) += 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
+    scale[row] = 1.0 / (features * bundle.features[i].inverse_depth);
+  }
+  information += scale * scale.transpose() / (scale_sigma * scale_sigma);
+  const Eigen::MatrixXd plain = information.inverse();
+
+  const Eigen::MatrixXd covariance = bundleCovariance(model, options, bundle, 2, scale_sigma);
+  const int kept = size - 6;
+  ASSERT_EQ(covariance.rows(), kept);
+  EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
+}
+
+TEST(BundleAdjustment, AWanderingFeatureHardlyMovesTheRest) {
+  const CameraModel model(exampleCalibration());
+  const Bundle truth = exampleBundle(model, 8, 30, 0.05, 0.1, 4);
+  Bundle clean = truth, disturbed = truth;
+  for (std::size_t k = 0; k < truth.cameras.size(); ++k)
+    for (BundleObservation& o : disturbed.observations[k])
+      if (o.feature == 7) o.pixel.y() += 2.0 * static_cast<double>(k);  // not along its ray
+  BundleOptions options = weakPrior();
+  options.sigma_px = 0.1;
+  options.outlier_px = 0.25;
+  adjustBundle(model, options, &clean);
+  adjustBundle(model, options, &disturbed);
+  EXPECT_LT((clean.cameras.back().position_world - disturbed.cameras.back().position_world).norm(),
+            0.03 * clean.cameras.back().position_world.norm());
+  const std::vector<double> errors = featureErrors(model, disturbed);
+  EXPECT_GT(errors[7], 1.0);
+  EXPECT_LT(errors[6], 0.3);
+}
+
+TEST(BundleAdjustment, ReversedDepthsExchangeNearAndFarAndKeepWhatANarrowViewShows) {
+  const CameraModel model(exampleCalibration());
+  const Eigen::Vector2d middle(315.0, 243.0);
+  Bundle truth = exampleBundle(model, 4, 300, 0.01, 0.0, 5);
+  for (std::size_t k = 0; k < truth.cameras.size(); ++k) {
+    truth.cameras[k] = CameraState();
+    truth.cameras[k].position_world.x() = 0.01 * static_cast<double>(k);
+    truth.observations[k].clear();
+    for (std::size_t i = 0; i < truth.features.size(); ++i) {
+      const auto first = projectFeature(model, truth.cameras.front(), truth.features[i]);
+      const auto seen = projectFeature(model, truth.cameras[k], truth.features[i]);
+      if (first && seen && (first->pixel - middle).norm() < 80.0)
+        truth.observations[k].push_back({static_cast<int>(i), seen->pixel});
+    }
+  }
+  Bundle reversed = truth;
+  reverseDepths(model, &reversed);
+  EXPECT_LT(
+      cosineBetween(reversed.cameras.back().position_world, truth.cameras.back().position_world),
+      -0.999);
+  double motion = 0.0, miss = 0.0;
+  for (const BundleObservation& o : truth.observations.back()) {
+    const auto first = projectFeature(model, truth.cameras.front(), truth.features[o.feature]);
+    const auto seen = projectFeature(model, reversed.cameras.back(), reversed.features[o.feature]);
+    motion += (o.pixel - first->pixel).norm();
+    miss += (o.pixel - seen->pixel).norm();
+  }
+  EXPECT_LT(miss, 0.1 * motion);
+  // Yet the images tell them apart.
+  Bundle adjusted = reversed, right = truth;
+  BundleOptions options = weakPrior();
+  options.sigma_px = 0.05;
+  EXPECT_GT(adjustBundle(model, options, &adjusted), adjustBundle(model, options, &right));
+}
+
+}  // namespace
+}  // namespace active_matching_slam

@@ -1,0 +1,142 @@
+#include "active_matching_slam/filter/start_adjustment.h"
+
+#include <gtest/gtest.h>
+
+#include "filter/example_bundle.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// A filter that has believed for `bundle`'s first images that the camera stood still.
+class StartOfATrack {
+ public:
+  explicit StartOfATrack(const Bundle& truth)
+      : truth_(truth), model_(exampleCalibration()), filter_(options()) {
+    filter_.reset(CameraState(), 1e-8 * Eigen::Matrix<double, 12, 12>::Identity());
+    std::vector<FeatureMeasurement> first;
+    for (const BundleObservation& o : truth.observations.front()) {
+      const FeatureId id = filter_.addInverseDepthFeature(model_, o.pixel);
+      place_of_id_.push_back(o.feature);
+      first.push_back({id, o.pixel, 0.0});
+    }
+    adjustment_.begin(0, first);
+  }
+
+  /// What the images up to `image` make of it; nothing is adjusted before the last.
+  std::optional<AdjustedStart> adjustAfter(int image) {
+    for (int k = 1; k <= image; ++k) {
+      std::vector<FeatureMeasurement> seen;
+      for (const BundleObservation& o : truth_.observations[k]) {
+        const auto it = std::find(place_of_id_.begin(), place_of_id_.end(), o.feature);
+        if (it != place_of_id_.end()) seen.push_back({it - place_of_id_.begin(), o.pixel, 0.0});
+      }
+      adjustment_.add(k, 1.0 / 30.0, filter_.camera(), seen);
+    }
+    return adjustment_.adjust(model_, filter_);
+  }
+
+  static FilterOptions options() {
+    FilterOptions options;
+    options.sigma_px = 0.5;
+    return options;
+  }
+
+  const StartAdjustment& adjustment() const { return adjustment_; }
+  Ekf& filter() { return filter_; }
+  int featureOf(FeatureId id) const { return place_of_id_[static_cast<std::size_t>(id)]; }
+
+ private:
+  Bundle truth_;
+  CameraModel model_;
+  Ekf filter_;
+  StartAdjustment adjustment_;
+  std::vector<int> place_of_id_;  ///< in the bundle
+};
+
+Bundle track(int images, double step_m, unsigned seed) {
+  return exampleBundle(CameraModel(exampleCalibration()), images, 40, step_m, 0.2, seed);
+}
+
+TEST(StartAdjustment, FindsTheMoveThatTheFilterMissed) {
+  const Bundle truth = track(12, 0.02, 1);
+  StartOfATrack start(truth);
+  const auto adjusted = start.adjustAfter(11);
+  ASSERT_TRUE(adjusted);
+  EXPECT_GT(cosineBetween(adjusted->camera.position_world, truth.cameras[11].position_world), 0.99);
+  EXPECT_LT(adjusted->camera.q_world_camera.angularDistance(truth.cameras[11].q_world_camera),
+            0.01);
+  const double scale =
+      adjusted->camera.position_world.norm() / truth.cameras[11].position_world.norm();
+  const Eigen::Vector3d velocity =
+      30.0 * (truth.cameras[11].position_world - truth.cameras[10].position_world);
+  EXPECT_LT((adjusted->camera.velocity_world / scale - velocity).norm(), 0.2 * velocity.norm());
+  // The unit of length: the median depth is what it was.
+  std::vector<double> inverse_depths;
+  for (const FeatureState& feature : adjusted->features)
+    inverse_depths.push_back(feature.inverse_depth);
+  std::sort(inverse_depths.begin(), inverse_depths.end());
+  EXPECT_NEAR(inverse_depths[inverse_depths.size() / 2], 1.0, 0.05);
+  // The state is one that a filter takes, and its errors are within its covariance.
+  start.filter().restore(adjusted->camera, adjusted->features, adjusted->covariance, 1000);
+  double sum = 0.0;
+  for (const FeatureState& feature : start.filter().features()) {
+    const double error =
+        feature.inverse_depth * scale - truth.features[start.featureOf(feature.id)].inverse_depth;
+    sum += std::pow(error / (scale * start.filter().sigmaInverseDepth(feature)), 2);
+  }
+  EXPECT_LT(sum / static_cast<double>(adjusted->features.size()), 2.5);
+}
+
+TEST(StartAdjustment, SaysWhereTheCamerasOfTheStartWere) {
+  const Bundle truth = track(12, 0.02, 2);
+  StartOfATrack start(truth);
+  const auto adjusted = start.adjustAfter(11);
+  ASSERT_TRUE(adjusted);
+  // The filter believed in a camera at rest; the correction takes image 5 to its place.
+  const Eigen::Isometry3d corrected = adjusted->corrected(5, Eigen::Isometry3d::Identity());
+  EXPECT_GT(cosineBetween(corrected.translation(), truth.cameras[5].position_world), 0.9);
+}
+
+TEST(StartAdjustment, ACameraThatOnlyTurnsIsLeftAlone) {
+  Bundle truth = track(12, 0.02, 3);
+  const CameraModel model(exampleCalibration());
+  Random random(3);
+  for (std::size_t k = 0; k < truth.cameras.size(); ++k) {
+    truth.cameras[k].position_world.setZero();
+    truth.observations[k].clear();
+    for (std::size_t i = 0; i < truth.features.size(); ++i) {
+      const auto p = projectFeature(model, truth.cameras[k], truth.features[i]);
+      const double du = random.normal(0.2), dv = random.normal(0.2);
+      if (p) truth.observations[k].push_back({int(i), p->pixel + Eigen::Vector2d(du, dv)});
+    }
+  }
+  StartOfATrack start(truth);
+  EXPECT_FALSE(start.adjustAfter(11));
+  EXPECT_TRUE(start.adjustment().isActive());
+}
+
+TEST(StartAdjustment, AFeatureThatWandersIsLeftOut) {
+  Bundle truth = track(12, 0.02, 4);
+  const int wanderer = truth.observations.front()[5].feature;
+  for (std::size_t k = 0; k < truth.cameras.size(); ++k)
+    for (BundleObservation& o : truth.observations[k])
+      if (o.feature == wanderer) o.pixel.y() += (k % 4 < 2 ? 4.0 : -4.0);
+  StartOfATrack start(truth);
+  const auto adjusted = start.adjustAfter(11);
+  ASSERT_TRUE(adjusted);
+  for (const FeatureState& feature : adjusted->features)
+    EXPECT_NE(start.featureOf(feature.id), wanderer);
+  EXPECT_GT(adjusted->features.size(), truth.observations.front().size() / 2);
+}
+
+TEST(StartAdjustment, EndsWhenTheFirstImageIsOutOfSight) {
+  Bundle truth = track(12, 0.02, 5);
+  StartOfATrack start(truth);
+  for (std::size_t k = 6; k < truth.observations.size(); ++k) truth.observations[k].resize(4);
+  StartOfATrack lost(truth);
+  EXPECT_FALSE(lost.adjustAfter(11));
+  EXPECT_FALSE(lost.adjustment().isActive());
+}
+
+}  // namespace
+}  // namespace active_matching_slam
