@@ -24,7 +24,7 @@ struct Bundle {
 };
 
 struct BundleOptions {
-  double sigma_px = 0.5;             ///< of an image point, per axis
+  double sigma_px = 0.45;            ///< of an image point, per axis
   double outlier_px = 1.25;          ///< image points much further off count for little
   double inverse_depth = 1.0;        ///< prior mean of every inverse depth; it sets the scale
   double sigma_inverse_depth = 0.5;  ///< and its standard deviation

@@ -4,9 +4,9 @@ namespace active_matching_slam {
 
 /// Settings of the EKF. Units: m stands for the map unit when scale is free.
 struct FilterOptions {
-  double sigma_acceleration_mps2 = 6.0;           ///< linear, per axis (eq. 3.6)
-  double sigma_angular_acceleration_rps2 = 10.0;  ///< angular, per axis
-  double sigma_px = 0.5;                          ///< measurement noise, per axis
+  double sigma_acceleration_mps2 = 7.0;           ///< linear, per axis (eq. 3.6)
+  double sigma_angular_acceleration_rps2 = 12.0;  ///< angular, per axis
+  double sigma_px = 0.45;                         ///< measurement noise, per axis
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
   double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
