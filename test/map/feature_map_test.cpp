@@ -313,6 +313,50 @@ TEST(FeatureMap, SparesFeaturesWhoseImagesFailTogether) {
   EXPECT_TRUE(map.failing(MapOptions()).empty());
 }
 
+/// Matches of 12 features over `frames`: all follow a common error of the prediction, the first
+/// `wander` pixels a match more.
+void watch(World* world, std::vector<FeatureId>* ids, int frames, double wander) {
+  for (int i = 0; i < 12; ++i) ids->push_back(world->add(Vector3d(0.1 * i - 0.5, 0.0, 2.0)));
+  for (int frame = 0; frame < frames; ++frame) {
+    std::vector<SearchRecord> searches;
+    for (int i = 0; i < 12; ++i) {
+      const double noise = 0.1 * ((7 * i + 5 * frame) % 11 - 5) / 5.0;
+      searches.push_back({(*ids)[i], true, 1, 50, Vector2d(1.5 + noise, i == 0 ? wander : noise)});
+    }
+    world->map.record(searches, frame);
+  }
+}
+
+TEST(FeatureMap, NamesThoseWhoseMatchesLeaveThePredictionAlwaysToOneSide) {
+  World world;
+  std::vector<FeatureId> ids;
+  watch(&world, &ids, 30, 0.8);
+  EXPECT_EQ(world.map.drifting(), std::vector<FeatureId>{ids[0]});
+}
+
+TEST(FeatureMap, ACommonErrorOfThePredictionIsNoDrift) {
+  World world;
+  std::vector<FeatureId> ids;
+  watch(&world, &ids, 30, 0.0);
+  EXPECT_TRUE(world.map.drifting().empty());
+}
+
+TEST(FeatureMap, AFewMatchesAreNoDriftYet) {
+  World world;
+  std::vector<FeatureId> ids;
+  watch(&world, &ids, 5, 3.0);
+  EXPECT_TRUE(world.map.drifting().empty());
+}
+
+TEST(FeatureMap, MovesFirstViewsByTheImageTheyWereTakenIn) {
+  World world;
+  const FeatureId id = world.add(Vector3d(0, 0, 2));
+  world.map.movePatches([](std::int64_t image, const Isometry3d& T_world_camera) {
+    return Isometry3d(T_world_camera * Eigen::Translation3d(static_cast<double>(image), 2, 3));
+  });
+  EXPECT_TRUE(world.map.find(id)->patch.T_world_camera.translation().isApprox(Vector3d(0, 2, 3)));
+}
+
 TEST(FeatureMap, LeavesFirstWhatIsFurthestFromTheView) {
   World world;
   const FeatureId ahead = world.add({0, 0, 2});
