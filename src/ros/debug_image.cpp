@@ -8,11 +8,13 @@
 #include <string>
 #include <unordered_map>
 
+#include "active_matching_slam/ros/submap_view.h"
+
 namespace active_matching_slam {
 namespace {
 
 const cv::Scalar kGreen(90, 230, 60), kOrange(20, 150, 255), kRed(60, 60, 255), kBlue(255, 160, 80),
-    kGold(40, 200, 255), kWhite(255, 255, 255);
+    kGold(40, 200, 255), kWhite(255, 255, 255), kGrey(150, 150, 150);
 constexpr int kLeastWidth_px = 640;
 constexpr int kShift = 4;  // drawing coordinates in sixteenths of a pixel
 
@@ -34,9 +36,10 @@ class Canvas {
     const cv::Size size(toFixed(axes.major_px * scale_), toFixed(axes.minor_px * scale_));
     cv::ellipse(image_, at(center), size, axes.angle_deg, 0, 360, color, 1, cv::LINE_AA, kShift);
   }
-  void line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const cv::Scalar& color) {
+  void line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const cv::Scalar& color,
+            int width = 1) {
     if (isDrawable(from) && isDrawable(to))
-      cv::line(image_, at(from), at(to), color, 1, cv::LINE_AA, kShift);
+      cv::line(image_, at(from), at(to), color, width, cv::LINE_AA, kShift);
   }
   void dot(const Eigen::Vector2d& center, double radius_px, const cv::Scalar& color) {
     if (isDrawable(center))
@@ -90,6 +93,49 @@ cv::Scalar orderColor(double share) {
   return {double(bgr[0]), double(bgr[1]), double(bgr[2])};
 }
 
+/// A link of the map's graph whose features are both predicted to be in the image; indices of
+/// frame.features.
+struct VisibleLink {
+  int first, second;
+  double information_bits;
+  bool in_tree;
+};
+
+/// The weakest first, so that the strong ones are drawn over them.
+std::vector<VisibleLink> visibleLinks(const TrackedFrame& frame) {
+  std::vector<VisibleLink> links;
+  if (!frame.graph) return links;
+  std::unordered_map<std::int64_t, int> visible;
+  for (std::size_t i = 0; i < frame.features.size(); ++i)
+    if (frame.features[i].status != FeatureStatus::kNotVisible)
+      visible[frame.features[i].id] = static_cast<int>(i);
+  for (const InformationLink& link : frame.graph->links) {
+    const auto first = visible.find(link.first), second = visible.find(link.second);
+    if (first != visible.end() && second != visible.end())
+      links.push_back({first->second, second->second, link.information_bits, link.in_tree});
+  }
+  std::stable_sort(links.begin(), links.end(), [](const VisibleLink& a, const VisibleLink& b) {
+    return a.information_bits < b.information_bits;
+  });
+  return links;
+}
+
+void drawLink(const TrackedFrame& frame, const VisibleLink& link, const cv::Scalar& color,
+              int width, Canvas* canvas) {
+  canvas->line(frame.features[link.first].predicted_px, frame.features[link.second].predicted_px,
+               color, width);
+}
+
+/// From violet (none) to yellow (the strongest in view).
+void drawLinks(const TrackedFrame& frame, double minimum_bits, Canvas* canvas) {
+  const std::vector<VisibleLink> links = visibleLinks(frame);
+  for (const VisibleLink& link : links)
+    if (link.information_bits >= minimum_bits)
+      drawLink(frame, link, orderColor(link.information_bits / links.back().information_bits), 1,
+               canvas);
+}
+
+/// The matcher's own tree where it has one, else the map's.
 void drawTree(const TrackedFrame& frame, Canvas* canvas) {
   const auto feature = [&](int candidate) -> const TrackedFeature& {
     return frame.features[frame.candidates[candidate]];
@@ -98,15 +144,29 @@ void drawTree(const TrackedFrame& frame, Canvas* canvas) {
   for (const auto& [i, j] : frame.matching.tree_edges)
     if (i >= 0 && j >= 0 && i < count && j < count)
       canvas->line(feature(i).predicted_px, feature(j).predicted_px, kGold);
-  if (!frame.matching.tree_edges.empty() || !frame.graph) return;
-  std::unordered_map<std::int64_t, const TrackedFeature*> visible;
-  for (const TrackedFeature& f : frame.features)
-    if (f.status != FeatureStatus::kNotVisible) visible[f.id] = &f;
-  for (const InformationLink& link : frame.graph->links) {
-    const auto first = visible.find(link.first), second = visible.find(link.second);
-    if (link.in_tree && first != visible.end() && second != visible.end())
-      canvas->line(first->second->predicted_px, second->second->predicted_px, kGold);
+  if (!frame.matching.tree_edges.empty()) return;
+  for (const VisibleLink& link : visibleLinks(frame))
+    if (link.in_tree) drawLink(frame, link, kGold, 1, canvas);
+}
+
+cv::Scalar submapScalar(int submap) {
+  const Eigen::Vector3f rgb = 255.0f * submapRgb(submap);
+  return {rgb[2], rgb[1], rgb[0]};
+}
+
+/// The map's tree inside each submap, and each feature, in the submap's colour; what joins two
+/// submaps in grey.
+void drawSubmaps(const TrackedFrame& frame, int level, Canvas* canvas) {
+  const std::vector<int> submaps = submapsAtLevel(frame, level);
+  for (const VisibleLink& link : visibleLinks(frame)) {
+    if (!link.in_tree) continue;
+    const bool inside = submaps[link.first] == submaps[link.second];
+    drawLink(frame, link, inside ? submapScalar(submaps[link.first]) : kGrey, inside ? 2 : 1,
+             canvas);
   }
+  for (std::size_t i = 0; i < frame.features.size(); ++i)
+    if (frame.features[i].status != FeatureStatus::kNotVisible && submaps[i] >= 0)
+      canvas->dot(frame.features[i].predicted_px, 5.0, submapScalar(submaps[i]));
 }
 
 void drawSearches(const TrackedFrame& frame, Canvas* canvas) {
@@ -195,9 +255,10 @@ EllipseAxes threeSigmaEllipse(const Eigen::Matrix2d& covariance_px2) {
   return axes;
 }
 
-cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options) {
+cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options, int submap_level) {
   if (frame.image.empty()) return {};
   Canvas canvas(frame.image);
+  if (options.links) drawLinks(frame, options.minimum_link_bits, &canvas);
   if (options.tree) drawTree(frame, &canvas);
   if (options.predictions)
     for (const TrackedFeature& feature : frame.features)
@@ -206,6 +267,7 @@ cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options) {
                        statusColor(feature));
   if (options.searches) drawSearches(frame, &canvas);
   if (options.matches) drawMatches(frame, &canvas);
+  if (options.submaps) drawSubmaps(frame, submap_level, &canvas);
   if (options.information)
     for (int candidate : frame.candidates) {
       const TrackedFeature& feature = frame.features[candidate];

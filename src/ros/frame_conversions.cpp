@@ -5,7 +5,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
 #include "active_matching_slam/ros/pose_conversions.h"
 
@@ -221,45 +220,18 @@ sensor_msgs::PointCloud2 toPointCloudMsg(const TrackedFrame& frame, int submap_l
   return cloud;
 }
 
-std::vector<int> submapsAtLevel(const TrackedFrame& frame, int level) {
-  if (!frame.submaps || frame.submaps->levels.empty())
-    return std::vector<int>(frame.features.size(), -1);
-  std::vector<int> submaps;
-  submaps.reserve(frame.features.size());
-  const int last = static_cast<int>(frame.submaps->levels.size()) - 1;
-  const SubmapLevel& chosen = frame.submaps->levels[std::clamp(level, 0, last)];
-  std::unordered_map<std::int64_t, int> submap_of_id;
-  const std::size_t count = std::min(frame.submaps->ids.size(), chosen.submap_of_feature.size());
-  for (std::size_t i = 0; i < count; ++i)
-    submap_of_id[frame.submaps->ids[i]] = chosen.submap_of_feature[i];
-  for (const TrackedFeature& feature : frame.features) {
-    const auto found = submap_of_id.find(feature.id);
-    submaps.push_back(found == submap_of_id.end() ? -1 : found->second);
-  }
-  return submaps;
-}
-
 bool isShowable(const TrackedFeature& feature, double limit_m) {
   return feature.position_world.allFinite() && feature.covariance_world.allFinite() &&
          feature.position_world.cwiseAbs().maxCoeff() < limit_m;
 }
 
 std_msgs::ColorRGBA submapColor(int submap) {
+  const Eigen::Vector3f rgb = submapRgb(submap);
   std_msgs::ColorRGBA color;
+  color.r = rgb[0];
+  color.g = rgb[1];
+  color.b = rgb[2];
   color.a = 1.0f;
-  if (submap < 0) {
-    color.r = color.g = color.b = 0.75f;
-    return color;
-  }
-  // Steps of the golden ratio around the colour wheel keep neighbours in label far apart in hue.
-  const double hue = 6.0 * std::fmod(0.08 + submap * 0.618033988749895, 1.0);
-  const auto channel = [hue](double offset) {
-    const double k = std::fmod(offset + hue, 6.0);
-    return static_cast<float>(1.0 - 0.75 * std::clamp(std::min(k, 4.0 - k), 0.0, 1.0));
-  };
-  color.r = channel(5.0);
-  color.g = channel(3.0);
-  color.b = channel(1.0);
   return color;
 }
 

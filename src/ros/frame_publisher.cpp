@@ -68,8 +68,10 @@ bool FramePublisher::wantsTrace() const {
 }
 
 bool FramePublisher::wantsStructure() const {
-  return hasListener(mutual_information_) || hasListener(submaps_) ||
-         hasListener(information_markers_.publisher) || hasListener(submap_markers_.publisher);
+  const bool drawn = options_.draw.links || options_.draw.submaps || options_.draw.tree;
+  return (drawn && debug_image_.getNumSubscribers() > 0) || hasListener(mutual_information_) ||
+         hasListener(submaps_) || hasListener(information_markers_.publisher) ||
+         hasListener(submap_markers_.publisher);
 }
 
 std_msgs::Header FramePublisher::worldHeader(const ros::Time& stamp) const {
@@ -136,7 +138,7 @@ void FramePublisher::publishDebugImage(const TrackedFrame& frame, const FrameCon
   image.header.stamp = context.stamp;
   image.header.frame_id = context.camera_frame;
   image.encoding = sensor_msgs::image_encodings::BGR8;
-  image.image = drawDebugImage(frame, options_.draw);
+  image.image = drawDebugImage(frame, options_.draw, options_.submap_level);
   if (!image.image.empty()) debug_image_.publish(image.toImageMsg());
 }
 

@@ -10,6 +10,7 @@
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "active_matching_slam/evaluation/run_report.h"
@@ -31,7 +32,7 @@ constexpr int kFault = 2;
 struct Settings {
   std::string bag, image_topic, camera_info_topic, camera_info, config, known_target, matcher;
   std::string ground_truth, ground_truth_topic, output;
-  std::vector<std::string> set;
+  std::vector<std::string> set, draw;
   int features = 0;
   RunOptions run;
   bool ground_truth_topic_given = false, simulated = false, annotate = false;
@@ -44,7 +45,8 @@ po::options_description describeOptions(Settings* s) {
   add("help,h", "this text");
   add("bag", text(&s->bag)->required(), "bag to track");
   add("output", text(&s->output)->required(),
-      "directory for trajectory.txt, statistics.csv, summary.json and trajectory.png");
+      "directory for trajectory.txt, statistics.csv, summary.json, trajectory.png and the map's "
+      "structure (mutual_information.csv, submaps.csv, submap_quality.csv, pictures)");
   add("image-topic", text(&s->image_topic)->default_value("/camera/image_raw"),
       "raw or compressed images");
   add("camera-info-topic", text(&s->camera_info_topic),
@@ -66,6 +68,8 @@ po::options_description describeOptions(Settings* s) {
       "simulate_bag");
   add("annotate", po::bool_switch(&s->annotate),
       "also write annotated.avi: what was predicted, searched and matched");
+  add("draw", po::value(&s->draw)->composing(),
+      "draw that into annotated.avi too: submaps, links, tree, ... (the node's draw/ parameters)");
   return options;
 }
 
@@ -105,12 +109,29 @@ RunTruth truthOf(const Settings& settings, const rosbag::Bag& bag) {
   return truth;
 }
 
+/// The defaults of the node, and `names` drawn besides.
+NodeOptions drawingOf(const std::vector<std::string>& names) {
+  NodeOptions options;
+  for (const std::string& name : names) {
+    bool known = false;
+    visitNodeOptions(options, [&](const OptionField& field, auto& value, auto...) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(value)>, bool>) {
+        if (field.name != "draw/" + name) return;
+        value = known = true;
+      }
+    });
+    if (!known) throw std::runtime_error("--draw " + name + ": the node has no draw/" + name);
+  }
+  return options;
+}
+
 /// Motion JPEG, opened at the first picture.
 class AnnotatedVideo {
  public:
-  explicit AnnotatedVideo(const std::string& path) : path_(path) {}
+  AnnotatedVideo(const std::string& path, const NodeOptions& drawing)
+      : path_(path), drawing_(drawing) {}
   void add(const TrackedFrame& frame) {
-    const cv::Mat picture = drawDebugImage(frame, DrawOptions());
+    const cv::Mat picture = drawDebugImage(frame, drawing_.draw, drawing_.submap_level);
     if (picture.empty()) return;
     if (!writer_.isOpened() &&
         !writer_.open(path_, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30.0, picture.size()))
@@ -120,6 +141,7 @@ class AnnotatedVideo {
 
  private:
   std::string path_;
+  NodeOptions drawing_;
   cv::VideoWriter writer_;
 };
 
@@ -157,8 +179,9 @@ void run(const Settings& settings) {
 
   Tracker tracker(camera, options);
   std::unique_ptr<AnnotatedVideo> video;
-  if (settings.annotate)
-    video = std::make_unique<AnnotatedVideo>(settings.output + "/annotated.avi");
+  if (settings.annotate || !settings.draw.empty())
+    video = std::make_unique<AnnotatedVideo>(settings.output + "/annotated.avi",
+                                             drawingOf(settings.draw));
   int total = (images.size() + settings.run.every - 1) / std::max(1, settings.run.every);
   if (settings.run.maximum_frames > 0) total = std::min(total, settings.run.maximum_frames);
   {

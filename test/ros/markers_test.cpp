@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "active_matching_slam/ros/debug_image.h"
+#include "active_matching_slam/ros/frame_conversions.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 
 namespace active_matching_slam {
@@ -203,16 +204,62 @@ TEST(MarkerHistory, DeletesWhatIsNoMore) {
 
 TEST(DebugImage, ShowsMatchesInColourAndEnlargesSmallImages) {
   TrackedFrame frame;
-  EXPECT_TRUE(drawDebugImage(frame, DrawOptions()).empty());
+  EXPECT_TRUE(drawDebugImage(frame, DrawOptions(), 0).empty());
   frame.image = cv::Mat(240, 320, CV_8UC1, cv::Scalar(128));
   frame.features = {pointFeature(1, {0, 0, 1})};
-  const cv::Mat image = drawDebugImage(frame, DrawOptions());
+  const cv::Mat image = drawDebugImage(frame, DrawOptions(), 0);
   ASSERT_EQ(CV_8UC3, image.type());
   EXPECT_EQ(640, image.cols);
   const cv::Vec3b at_match = image.at<cv::Vec3b>(81, 101);
   EXPECT_GT(at_match[1], at_match[2] + 50) << "green at the match";
   EXPECT_EQ(0.0, cv::norm(frame.image, cv::Mat(240, 320, CV_8UC1, cv::Scalar(128))))
       << "the tracked image is left alone";
+}
+
+TEST(DebugImage, ShowsLinksByBitsAndSubmapsInTheirColoursWhenAsked) {
+  TrackedFrame frame;
+  frame.image = cv::Mat(480, 640, CV_8UC1, cv::Scalar(0));
+  for (int i = 0; i < 3; ++i) {
+    frame.features.push_back(pointFeature(i, {0, 0, 1}));
+    frame.features[i].predicted_px = {100.0 + 200.0 * i, 100.0 + 300.0 * (i % 2)};
+  }
+  auto graph = std::make_shared<MutualInformationGraph>();
+  graph->ids = {0, 1, 2};
+  graph->links = {{0, 1, 4.0, 5, true}, {0, 2, 1.0, 5, false}, {1, 2, 0.1, 5, true}};
+  frame.graph = graph;
+  auto hierarchy = std::make_shared<SubmapHierarchy>();
+  hierarchy->ids = graph->ids;
+  hierarchy->levels.resize(2);
+  hierarchy->levels[0].submap_of_feature = {0, 1, 2};
+  hierarchy->levels[1].submap_of_feature = {3, 3, 5};
+  frame.submaps = hierarchy;
+  const auto middle = [&](const cv::Mat& image, int i, int j) {
+    const Eigen::Vector2d at =
+        0.5 * (frame.features[i].predicted_px + frame.features[j].predicted_px);
+    return image.at<cv::Vec3b>(static_cast<int>(at.y()), static_cast<int>(at.x()));
+  };
+  DrawOptions plain;
+  plain.predictions = plain.searches = plain.matches = plain.status = false;
+  EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(drawDebugImage(frame, plain, 1), 0, 1));
+
+  DrawOptions links = plain;
+  links.links = true;
+  cv::Mat image = drawDebugImage(frame, links, 1);
+  EXPECT_GT(middle(image, 0, 1)[2], 200) << "yellow: the strongest";
+  EXPECT_GT(cv::norm(middle(image, 0, 2)), 0.0);
+  EXPECT_LT(middle(image, 0, 2)[2], 100) << "darker: weaker";
+  EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(image, 1, 2)) << "too weak";
+
+  DrawOptions submaps = plain;
+  submaps.submaps = true;
+  image = drawDebugImage(frame, submaps, 1);
+  const std_msgs::ColorRGBA third = submapColor(3);
+  const cv::Vec3b inside = middle(image, 0, 1), across = middle(image, 1, 2);
+  EXPECT_NEAR(255.0 * third.r, inside[2], 3.0);
+  EXPECT_NEAR(255.0 * third.b, inside[0], 3.0);
+  EXPECT_GT(across[0], 0);
+  EXPECT_EQ(across[0], across[2]) << "grey: joins two submaps";
+  EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(image, 0, 2)) << "not of the tree";
 }
 
 TEST(DebugImage, SurvivesWhatIsNotFinite) {
@@ -222,8 +269,8 @@ TEST(DebugImage, SurvivesWhatIsNotFinite) {
   frame.features[0].predicted_px.setConstant(std::nan(""));
   frame.features[0].innovation_covariance_px2.setConstant(INFINITY);
   DrawOptions all;
-  all.templates = all.information = all.tree = true;
-  EXPECT_NO_THROW(drawDebugImage(frame, all));
+  all.templates = all.information = all.tree = all.links = all.submaps = true;
+  EXPECT_NO_THROW(drawDebugImage(frame, all, 0));
 }
 
 }  // namespace

@@ -17,8 +17,8 @@ EllipseAxes threeSigmaEllipse(const Eigen::Matrix2d& covariance_px2);
 
 /// The image with what the tracker made of it, 8-bit BGR; small images are enlarged by a whole
 /// factor. Green: accepted match, orange: rejected one, red: searched in vain, blue: not searched;
-/// searched ellipses run from violet (first) over green to yellow (last). Empty when `frame` has no
-/// image.
-cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options);
+/// searched ellipses run from violet (first) over green to yellow (last). Submaps are those of
+/// `submap_level` (submapsAtLevel()). Empty when `frame` has no image.
+cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options, int submap_level);
 
 }  // namespace active_matching_slam

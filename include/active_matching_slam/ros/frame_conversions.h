@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "active_matching_slam/ros/messages.h"
+#include "active_matching_slam/ros/submap_view.h"
 #include "active_matching_slam/tracker/tracked_frame.h"
 
 namespace active_matching_slam {
@@ -34,14 +35,10 @@ ams_msgs::SubmapHierarchy toSubmapsMsg(const TrackedFrame& frame, const std_msgs
 sensor_msgs::PointCloud2 toPointCloudMsg(const TrackedFrame& frame, int submap_level,
                                          const std_msgs::Header& header);
 
-/// Submap of each entry of frame.features at `level` of the hierarchy (the last level when there are
-/// fewer; -1 where there is none, or no hierarchy).
-std::vector<int> submapsAtLevel(const TrackedFrame& frame, int level);
-
 /// True when position and covariance can be shown: finite, and not further than `limit_m`.
 bool isShowable(const TrackedFeature& feature, double limit_m = 1e6);
 
-/// Distinct colour for a submap label; grey for none (-1). Same label, same colour, always.
+/// submapRgb(), opaque.
 std_msgs::ColorRGBA submapColor(int submap);
 
 }  // namespace active_matching_slam

@@ -14,6 +14,8 @@ struct DrawOptions {
   bool templates = false;    ///< the patches, at the lower border
   bool information = false;  ///< bits beside each candidate
   bool tree = false;         ///< links of the Chow-Liu tree
+  bool links = false;        ///< links of mutual information
+  bool submaps = false;      ///< features and tree in the colours of their submaps
   bool status = true;        ///< one line of text
   double frustum_m = 0.15;
   double minimum_link_bits = 0.5;
@@ -91,11 +93,17 @@ void visitNodeOptions(Options& o, Visitor&& visit) {
   visit(F{"draw/information", "mutual information beside each candidate [bit]", true},
         o.draw.information);
   visit(F{"draw/tree", "links of the Chow-Liu tree in ~debug_image", true}, o.draw.tree);
+  visit(
+      F{"draw/links", "links of mutual information between visible features in ~debug_image", true},
+      o.draw.links);
+  visit(
+      F{"draw/submaps", "features and tree in the colours of their submaps in ~debug_image", true},
+      o.draw.submaps);
   visit(F{"draw/status", "a line of text in ~debug_image", true}, o.draw.status);
   visit(F{"draw/frustum_m", "length of the camera's frustum in ~markers/camera [m]", true},
         o.draw.frustum_m, 1e-3, 1e3);
   visit(F{"draw/minimum_link_bits",
-          "weaker links are left out of ~markers/mutual_information [bit]", true},
+          "weaker links are left out of ~markers/mutual_information and ~debug_image [bit]", true},
         o.draw.minimum_link_bits, 0.0, 100.0);
 }
 
