@@ -223,7 +223,7 @@ MarkerArray submapMarkers(const TrackedFrame& frame, int level, const std_msgs::
   MarkerArray markers;
   const double size = sceneSize(frame);
   const std::vector<int> submaps = submapsAtLevel(frame, level);
-  Marker points = makePoints(header, "features", 0.02 * size);
+  Marker points = makePoints(header, "features", 0.028 * size);
   std::unordered_map<int, std::vector<Eigen::Vector3d>> members;
   for (std::size_t i = 0; i < frame.features.size(); ++i) {
     if (!isShowable(frame.features[i]) || submaps[i] < 0) continue;
@@ -231,7 +231,7 @@ MarkerArray submapMarkers(const TrackedFrame& frame, int level, const std_msgs::
     members[submaps[i]].push_back(frame.features[i].position_world);
   }
 
-  Marker tree = makeLines(header, "tree", 0, 0.004 * size);
+  Marker tree = makeLines(header, "tree", 0, 0.008 * size);
   if (frame.graph) {
     const auto index = indexById(frame);
     for (const InformationLink& link : frame.graph->links) {
@@ -244,7 +244,7 @@ MarkerArray submapMarkers(const TrackedFrame& frame, int level, const std_msgs::
     }
   }
 
-  Marker hulls = makeLines(header, "hulls", 0, 0.002 * size);
+  Marker hulls = makeLines(header, "hulls", 0, 0.003 * size);
   for (const auto& [submap, positions] : members) {
     addHull(positions, submapColor(submap), &hulls);
     if (positions.size() < 2) continue;
@@ -252,7 +252,7 @@ MarkerArray submapMarkers(const TrackedFrame& frame, int level, const std_msgs::
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     for (const Eigen::Vector3d& position : positions) center += position / positions.size();
     label.pose.position = toPointMsg(center);
-    label.scale.z = 0.05 * size;
+    label.scale.z = 0.09 * size;
     label.color = submapColor(submap);
     label.text = std::to_string(submap) + " (" + std::to_string(positions.size()) + ")";
     markers.markers.push_back(std::move(label));
