@@ -196,17 +196,102 @@ double massOfNarrowPixel(const Eigen::Vector2d& m, const Eigen::Vector2d& mean,
   return 0.5 * sum / (sigma_v * std::sqrt(2.0 * M_PI));
 }
 
-double massOnNarrowPixels(const PixelMask& mask, const Eigen::Vector2d& mean,
-                          const Eigen::Matrix2d& c) {
-  const double reach_u = kFarthest * std::sqrt(c(0, 0)) + 0.5;
-  const double reach_v = kFarthest * std::sqrt(c(1, 1)) + 0.5;
+/// Sum of p over a run of pixels, for Gaussians narrower than pixels resolve.
+class NarrowRuns {
+ public:
+  NarrowRuns(const Eigen::Vector2d& mean, const Eigen::Matrix2d& covariance)
+      : mean_(mean),
+        covariance_(covariance),
+        reach_u_(kFarthest * std::sqrt(covariance(0, 0)) + 0.5),
+        reach_v_(kFarthest * std::sqrt(covariance(1, 1)) + 0.5) {}
+
+  double operator()(const PixelRun& run) const {
+    if (std::abs(run.v - mean_.y()) > reach_v_) return 0.0;
+    const double first = std::max<double>(run.begin_u, std::ceil(mean_.x() - reach_u_));
+    const double last = std::min<double>(run.end_u - 1, std::floor(mean_.x() + reach_u_));
+    double sum = 0.0;
+    for (double u = first; u <= last; u += 1.0)
+      sum += massOfNarrowPixel({u, run.v}, mean_, covariance_);
+    return sum;
+  }
+
+ private:
+  Eigen::Vector2d mean_;
+  Eigen::Matrix2d covariance_;
+  double reach_u_, reach_v_;
+};
+
+/// The same for all others: density(u, v) = row(v) exp(-(u - middle(v))^2 / (2 variance)).
+class WideRuns {
+ public:
+  WideRuns(const Eigen::Vector2d& mean, const Eigen::Matrix2d& c)
+      : mean_(mean),
+        yy_(c(1, 1)),
+        variance_(c(0, 0) - c(0, 1) * c(0, 1) / yy_),
+        sigma_(std::sqrt(variance_)),
+        tilt_(c(0, 1) / yy_),
+        scale_(1.0 / (2.0 * M_PI * sigma_ * std::sqrt(yy_))),
+        half_(0.5 / variance_),
+        step_(std::exp(-2.0 * half_)),
+        step4_(step_ * step_ * step_ * step_),
+        step12_(std::exp(-12.0 * half_)),
+        step16_((step4_ * step4_) * (step4_ * step4_)) {}
+
+  double operator()(const PixelRun& run) const {
+    constexpr double kReach2 = kFarthest * kFarthest;
+    const double dv = run.v - mean_.y(), dv2 = dv * dv / yy_;
+    if (dv2 >= kReach2) return 0.0;
+    const double middle = mean_.x() + tilt_ * dv, half = sigma_ * std::sqrt(kReach2 - dv2);
+    const double first = std::ceil(middle - half), last = std::floor(middle + half);
+    if (last < run.begin_u || first > run.end_u - 1) return 0.0;
+    // A sum over all integers is the integral, to 2 exp(-2 pi^2 variance).
+    if (variance_ >= 1.0 && first > run.begin_u && last < run.end_u - 1)
+      return scale_ * std::exp(-0.5 * dv2) * sigma_ * std::sqrt(2.0 * M_PI);
+    const int begin = std::max(run.begin_u, static_cast<int>(first));
+    const int end = std::min(run.end_u, static_cast<int>(last) + 1);
+    // Four interleaved recurrences e(u + 4) = e(u) r(u), r(u + 4) = r(u) exp(-32 half).
+    double e[4], r[4], partial[4] = {0.0, 0.0, 0.0, 0.0};
+    const double x = begin - middle;
+    double ratio = std::exp(-(2.0 * x + 1.0) * half_);
+    const double ratio2 = ratio * ratio;
+    double ratio4 = ratio2 * ratio2 * step12_;
+    e[0] = std::exp(-0.5 * dv2 - x * x * half_);
+    r[0] = ratio4;
+    for (int i = 1; i < 4; ++i) {
+      e[i] = e[i - 1] * ratio;
+      ratio *= step_;
+      ratio4 *= step4_;
+      r[i] = ratio4;
+    }
+    int u = begin;
+    for (; u + 4 <= end; u += 4) {
+      for (int i = 0; i < 4; ++i) {
+        partial[i] += e[i];
+        e[i] *= r[i];
+        r[i] *= step16_;
+      }
+    }
+    double total = partial[0] + partial[1] + partial[2] + partial[3];
+    for (int i = 0; u < end; ++u, ++i) total += e[i];
+    return scale_ * total;
+  }
+
+ private:
+  Eigen::Vector2d mean_;
+  double yy_, variance_, sigma_, tilt_, scale_, half_, step_, step4_, step12_, step16_;
+};
+
+template <typename OfRun>
+double massOnMask(const PixelMask& mask, const OfRun& ofRun) {
   double sum = 0.0;
-  mask.forEachRun([&](const PixelRun& run) {
-    if (std::abs(run.v - mean.y()) > reach_v) return;
-    const double first = std::max<double>(run.begin_u, std::ceil(mean.x() - reach_u));
-    const double last = std::min<double>(run.end_u - 1, std::floor(mean.x() + reach_u));
-    for (double u = first; u <= last; u += 1.0) sum += massOfNarrowPixel({u, run.v}, mean, c);
-  });
+  mask.forEachRun([&](const PixelRun& run) { sum += ofRun(run); });
+  return sum;
+}
+
+template <typename OfRun>
+double massOnList(const std::vector<PixelRun>& runs, std::size_t first, const OfRun& ofRun) {
+  double sum = 0.0;
+  for (std::size_t i = first; i < runs.size(); ++i) sum += ofRun(runs[i]);
   return sum;
 }
 
@@ -329,57 +414,14 @@ double massOfPixel(const Eigen::Vector2d& m, const Eigen::Vector2d& mean,
 
 double massOnPixels(const PixelMask& mask, const Eigen::Vector2d& mean,
                     const Eigen::Matrix2d& covariance) {
-  if (isNarrow(covariance)) return massOnNarrowPixels(mask, mean, covariance);
-  constexpr double kReach2 = kFarthest * kFarthest;
-  const double xy = covariance(0, 1), yy = covariance(1, 1);
-  const double det = covariance(0, 0) * yy - xy * xy;
-  // Row by row: density(u, v) = row(v) * exp(-(u - middle)^2 / (2 variance)).
-  const double variance = det / yy, sigma = std::sqrt(variance), tilt = xy / yy;
-  const double scale = 1.0 / (2.0 * M_PI * std::sqrt(det)), half_over_variance = 0.5 / variance;
-  const double step4 = std::exp(-32.0 * half_over_variance);
-  double sum = 0.0;
-  mask.forEachRun([&](const PixelRun& run) {
-    const double dv = run.v - mean.y(), dv2 = dv * dv / yy;
-    if (dv2 >= kReach2) return;
-    const double middle = mean.x() + tilt * dv, half = sigma * std::sqrt(kReach2 - dv2);
-    const double first = std::ceil(middle - half), last = std::floor(middle + half);
-    if (last < run.begin_u || first > run.end_u - 1) return;
-    const double row = std::exp(-0.5 * dv2);
-    // A sum over all integers is the integral, to 2 exp(-2 pi^2 variance).
-    if (variance >= 1.0 && first > run.begin_u && last < run.end_u - 1) {
-      sum += row * sigma * std::sqrt(2.0 * M_PI);
-      return;
-    }
-    const int begin = std::max(run.begin_u, static_cast<int>(first));
-    const int end = std::min(run.end_u, static_cast<int>(last) + 1);
-    // Four interleaved recurrences e(u + 4) = e(u) r(u), r(u + 4) = r(u) step4.
-    double e[4], r[4], partial[4] = {0.0, 0.0, 0.0, 0.0};
-    const double x = begin - middle;
-    double ratio = std::exp(-(2.0 * x + 1.0) * half_over_variance);
-    double ratio4 = std::exp(-(8.0 * x + 16.0) * half_over_variance);
-    const double ratio_step = std::exp(-2.0 * half_over_variance);
-    const double ratio4_step = std::exp(-8.0 * half_over_variance);
-    e[0] = std::exp(-x * x * half_over_variance);
-    r[0] = ratio4;
-    for (int i = 1; i < 4; ++i) {
-      e[i] = e[i - 1] * ratio;
-      ratio *= ratio_step;
-      ratio4 *= ratio4_step;
-      r[i] = ratio4;
-    }
-    int u = begin;
-    for (; u + 4 <= end; u += 4) {
-      for (int i = 0; i < 4; ++i) {
-        partial[i] += e[i];
-        e[i] *= r[i];
-        r[i] *= step4;
-      }
-    }
-    double total = partial[0] + partial[1] + partial[2] + partial[3];
-    for (int i = 0; u < end; ++u, ++i) total += e[i];
-    sum += row * total;
-  });
-  return scale * sum;
+  return isNarrow(covariance) ? massOnMask(mask, NarrowRuns(mean, covariance))
+                              : massOnMask(mask, WideRuns(mean, covariance));
+}
+
+double massOnRuns(const std::vector<PixelRun>& runs, std::size_t first, const Eigen::Vector2d& mean,
+                  const Eigen::Matrix2d& covariance) {
+  return isNarrow(covariance) ? massOnList(runs, first, NarrowRuns(mean, covariance))
+                              : massOnList(runs, first, WideRuns(mean, covariance));
 }
 
 }  // namespace active_matching_slam

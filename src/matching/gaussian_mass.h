@@ -40,4 +40,8 @@ double massOfPixel(const Eigen::Vector2d& m, const Eigen::Vector2d& mean,
 double massOnPixels(const PixelMask& mask, const Eigen::Vector2d& mean,
                     const Eigen::Matrix2d& covariance);
 
+/// Sum of p over disjoint runs, from `first` to the end.
+double massOnRuns(const std::vector<PixelRun>& runs, std::size_t first, const Eigen::Vector2d& mean,
+                  const Eigen::Matrix2d& covariance);
+
 }  // namespace active_matching_slam

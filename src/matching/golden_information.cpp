@@ -15,6 +15,8 @@ std::string at(const std::string& what, std::size_t i) {
 
 void checkVector(const std::string& what, const YAML::Node& expected, const Eigen::VectorXd& actual,
                  double absolute, double relative, Comparison& compare) {
+  compare.integer(what + " size", YAML::Node(expected.size()), actual.size());
+  if (static_cast<Eigen::Index>(expected.size()) != actual.size()) return;
   for (std::size_t i = 0; i < expected.size(); ++i)
     compare.number(at(what, i), expected[i], actual(static_cast<Eigen::Index>(i)), absolute,
                    relative);
@@ -53,10 +55,7 @@ void checkHierarchy(const YAML::Node& levels, const MeasurementPrior& prior, Com
   }
 }
 
-}  // namespace
-
-void checkInformation(const YAML::Node& mi, const MeasurementPrior& prior, Comparison& compare) {
-  if (!mi || mi.IsNull()) return;
+void checkInformationOf(const YAML::Node& mi, const MeasurementPrior& prior, Comparison& compare) {
   const FeatureInformation information = featureInformation(prior.S);
   checkVector("mi.features", mi["features"], information.bits, kBits, 0.0, compare);
   checkVector("mi.L_det", mi["L_det"], information.precision_determinant, 0.0, kRelative, compare);
@@ -79,6 +78,13 @@ void checkInformation(const YAML::Node& mi, const MeasurementPrior& prior, Compa
   compare.number("mi.tree_kl_bits", mi["tree_kl_bits"],
                  treeDivergenceBits(prior.S, tree).value_or(-1.0), kBits);
   checkHierarchy(mi["boruvka"], prior, compare);
+}
+
+}  // namespace
+
+void checkInformation(const YAML::Node& file, const MeasurementPrior& prior, Comparison& compare) {
+  compare.section(file, "mi",
+                  [&](const YAML::Node& mi) { checkInformationOf(mi, prior, compare); });
 }
 
 }  // namespace active_matching_slam::golden

@@ -13,7 +13,9 @@ std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-void MeasurementChoice::updateEntropy() {
+void MeasurementChoice::beginStep() {
+  ++step_;
+  groups_.resize(slot(mixture_.features()));
   log_weights_.clear();
   double entropy = 0.0;
   for (const Hypothesis& h : mixture_.hypotheses()) {
@@ -23,24 +25,58 @@ void MeasurementChoice::updateEntropy() {
   entropy_ = entropy * kLog2E;
 }
 
+const std::vector<MeasurementChoice::Group>& MeasurementChoice::groupsOf(int feature) {
+  FeatureGroups& known = groups_[slot(feature)];
+  if (known.step == step_) return known.groups;
+  known.step = step_;
+  known.groups.clear();
+  group_of_entry_.assign(PairTable::kMost, -1);
+  const std::vector<Hypothesis>& all = mixture_.hypotheses();
+  for (int k = 0; k < static_cast<int>(all.size()); ++k) {
+    const int entry = all[slot(k)].entry[slot(feature)];
+    const double weight = all[slot(k)].weight, weighted_log = weight * log_weights_[slot(k)];
+    int* group = entry == PairTable::kNone ? nullptr : &group_of_entry_[slot(entry)];
+    if (group && *group >= 0) {
+      Group& joined = known.groups[slot(*group)];
+      ++joined.members;
+      joined.weight += weight;
+      joined.weighted_log += weighted_log;
+      continue;
+    }
+    if (group) *group = static_cast<int>(known.groups.size());
+    known.groups.push_back({k, entry, 1, weight, weighted_log});
+  }
+  return known.groups;
+}
+
 /// (eq. 5.13-5.18) with the likelihoods divided by that of clutter alone. The entropy of weights
 /// w_k = lambda_k t_k is ln W - sum_k lambda_k (t_k ln lambda_k + t_k ln t_k) / W.
 ExpectedInformation MeasurementChoice::evaluate(int g, int c) {
-  const std::vector<Hypothesis>& all = mixture_.hypotheses();
-  const Hypothesis& searcher = all[slot(g)];
+  const Hypothesis& searcher = mixture_.hypotheses()[slot(g)];
   const Hypothesis::Candidate& gate = searcher.candidates[slot(c)];
+  const int own_entry = searcher.entry[slot(gate.feature)];
+  const double own_weight = searcher.weight, own_weighted_log = own_weight * log_weights_[slot(g)];
   double null_sum = 0.0, null_log = 0.0, match_sum = 0.0, match_log = 0.0;
-  for (int k = 0; k < static_cast<int>(all.size()); ++k) {
-    const PairTerm& term = mixture_.term(k, c, g);
-    const double weight = all[slot(k)].weight, log_weight = log_weights_[slot(k)];
+  const auto add = [&](const PairTerm& term, double weight, double weighted_log) {
     null_sum += weight * term.null;
-    null_log += weight * (term.null * log_weight + term.null_log);
+    null_log += weighted_log * term.null + weight * term.null_log;
     match_sum += weight * term.match;
-    match_log += weight * (term.match * log_weight + term.match_log);
+    match_log += weighted_log * term.match + weight * term.match_log;
+  };
+  for (const Group& group : groupsOf(gate.feature)) {
+    const bool is_own = own_entry == PairTable::kNone ? group.representative == g
+                                                      : group.entry == own_entry;
+    if (!is_own) {
+      add(mixture_.term(group.representative, c, g), group.weight, group.weighted_log);
+    } else if (group.members > 1) {
+      add(mixture_.term(group.representative, c, g), group.weight - own_weight,
+          group.weighted_log - own_weighted_log);
+    }
   }
-  const double child = searcher.weight * gate.child;
+  add(mixture_.ownTerm(g, c), own_weight, own_weighted_log);
+  const double child = own_weight * gate.child;
   match_sum += child;
-  match_log += searcher.weight * (gate.child * log_weights_[slot(g)] + gate.child_log);
+  match_log += own_weighted_log * gate.child + own_weight * gate.child_log;
   ExpectedInformation expected;
   expected.null_probability =
       null_sum / (null_sum + mixture_.likelihood(gate.feature).clutter_odds * match_sum);
@@ -48,8 +84,7 @@ ExpectedInformation MeasurementChoice::evaluate(int g, int c) {
   const double after_match = (std::log(match_sum) - match_log / match_sum) * kLog2E;
   expected.discrete_bits = entropy_ - expected.null_probability * after_null -
                            (1.0 - expected.null_probability) * after_match;
-  expected.continuous_bits =
-      child / match_sum * searcher.joint->marginal(gate.feature).information_bits;
+  expected.continuous_bits = child / match_sum * gate.bits;
   expected.score = expected.bits() / gate.area;
   return expected;
 }
@@ -62,7 +97,7 @@ double MeasurementChoice::bound(const Hypothesis& h, const Hypothesis::Candidate
   const double own = h.weight * (missed * gate.mass + gate.area * (1.0 - gate.mass));
   const double others = (1.0 - h.weight) * std::min(gate.area, likelihood.match + missed);
   const double share = child / (child + std::max(own, 0.0) + std::max(others, 0.0));
-  const double bits = entropy_ + share * h.joint->marginal(gate.feature).information_bits;
+  const double bits = entropy_ + share * gate.bits;
   return bits / gate.area * (1.0 + 1e-9);
 }
 
@@ -76,31 +111,42 @@ ExpectedInformation MeasurementChoice::takeIfBetter(int g, int c, Measurement& b
 }
 
 Measurement MeasurementChoice::best() {
-  updateEntropy();
-  bounds_.clear();
-  const int count = static_cast<int>(mixture_.hypotheses().size());
-  std::size_t most_promising = 0;
-  for (int g = 0; g < count; ++g) {
-    const Hypothesis& h = mixture_.hypotheses()[slot(g)];
-    for (std::size_t c = 0; c < h.candidates.size(); ++c) {
-      if (!h.candidates[c].open) continue;
-      bounds_.push_back({bound(h, h.candidates[c]), g, static_cast<int>(c)});
-      if (bounds_.back().bound > bounds_[most_promising].bound) most_promising = bounds_.size() - 1;
+  beginStep();
+  const auto& all = mixture_.hypotheses();
+  // A promising one first, so that the bound can spare most of the others.
+  Measurement best, promising;
+  double most = -1.0;
+  for (int g = 0; g < static_cast<int>(all.size()); ++g) {
+    const auto& candidates = all[slot(g)].candidates;
+    for (int c = 0; c < static_cast<int>(candidates.size()); ++c) {
+      const Hypothesis::Candidate& gate = candidates[slot(c)];
+      if (!gate.open || !(entropy_ + gate.bits > most * gate.area)) continue;
+      most = (entropy_ + gate.bits) / gate.area;
+      promising = {g, c, {}};
     }
   }
-  // A good one first, so that the bound can spare most of the others.
-  Measurement best;
-  const auto consider = [&](const Bounded& b) {
-    if (best.exists() && b.bound < best.expected.score) return;
-    if (isCandidate(b.hypothesis, b.candidate)) takeIfBetter(b.hypothesis, b.candidate, best);
+  const auto consider = [&](int g, int c) {
+    if (isCandidate(g, c)) takeIfBetter(g, c, best);
   };
-  if (!bounds_.empty()) consider(bounds_[most_promising]);
-  for (const Bounded& b : bounds_) consider(b);
+  if (promising.exists()) consider(promising.hypothesis, promising.candidate);
+  for (int g = 0; g < static_cast<int>(all.size()); ++g) {
+    const Hypothesis& h = all[slot(g)];
+    for (int c = 0; c < static_cast<int>(h.candidates.size()); ++c) {
+      const Hypothesis::Candidate& gate = h.candidates[slot(c)];
+      if (!gate.open) continue;
+      const double score = best.exists() ? best.expected.score : 0.0;
+      // The first test is a weaker bound that costs next to nothing.
+      if (best.exists() && ((entropy_ + gate.bits) * (1.0 + 1e-9) < score * gate.area ||
+                            bound(h, gate) < score))
+        continue;
+      consider(g, c);
+    }
+  }
   return best;
 }
 
 Measurement MeasurementChoice::bestOfDrawn(int count, std::mt19937_64& random, double& most_bits) {
-  updateEntropy();
+  beginStep();
   const int hypotheses = static_cast<int>(mixture_.hypotheses().size());
   std::vector<std::vector<int>> open(slot(hypotheses));
   for (int g = 0; g < hypotheses; ++g) {

@@ -51,7 +51,17 @@ class MeasurementChoice {
                .open &&
            !(skip_sterile_ && mixture_.isSterile(g, c));
   }
-  void updateEntropy();
+  /// Gaussians that see every search of a feature alike: their weights together.
+  struct Group {
+    int representative;
+    int entry;
+    int members;
+    double weight;
+    double weighted_log;  ///< sum of lambda ln(lambda)
+  };
+
+  void beginStep();
+  const std::vector<Group>& groupsOf(int feature);
   double bound(const Hypothesis& h, const Hypothesis::Candidate& gate) const;
   ExpectedInformation takeIfBetter(int g, int c, Measurement& best);
 
@@ -59,11 +69,13 @@ class MeasurementChoice {
   bool skip_sterile_;
   double entropy_ = 0.0;             // H(lambda) [bits]
   std::vector<double> log_weights_;  // ln(lambda)
-  struct Bounded {
-    double bound;
-    int hypothesis, candidate;
+  struct FeatureGroups {
+    std::int64_t step = -1;
+    std::vector<Group> groups;
   };
-  std::vector<Bounded> bounds_;
+  std::int64_t step_ = 0;
+  std::vector<FeatureGroups> groups_;  // by feature
+  std::vector<int> group_of_entry_;
 };
 
 }  // namespace active_matching_slam

@@ -24,12 +24,15 @@ Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& led
   root.match.assign(size, -1);
   root.lineage.assign(size, -1);
   root.candidate_of.assign(size, -1);
+  root.entry.assign(size, PairTable::kNone);
+  pairs_.resize(size);
+  fused_entries_.resize(size);
   for (int f = 0; f < joint.size(); ++f) {
     valid_.push_back(ledger.validArea(f));
     root.mean[slot(f)] = prior.mean(f);
+    root.entry[slot(f)] = pairs_[slot(f)].acquire();
     addCandidate(root, f);
   }
-  root.slot = pairs_.acquire();
   hypotheses_.push_back(std::move(root));
 }
 
@@ -40,52 +43,71 @@ int Mixture::heaviest() const {
   return best;
 }
 
+double Mixture::computeMass(const Hypothesis& of, const Hypothesis& in,
+                            const Hypothesis::Candidate& candidate) const {
+  const int f = candidate.feature;
+  if (!(of.joint->marginal(f).determinant > 0.0)) return 0.0;
+  return candidate.clipped
+             ? ClippedEllipse(in.ellipse(f), valid_[slot(f)])
+                   .mass(of.mean[slot(f)], of.covariance(f))
+             : massInEllipse(in.ellipse(f), of.mean[slot(f)], of.covariance(f));
+}
+
 double Mixture::mass(int k, int c, int g) {
   const Hypothesis& of = hypotheses_[slot(k)];
   const Hypothesis& in = hypotheses_[slot(g)];
   const Hypothesis::Candidate& candidate = in.candidates[slot(c)];
-  if (k == g) return candidate.mass;
-  const bool remembered = of.slot >= 0 && in.slot >= 0;
-  if (remembered) {
-    PairTable::Row& row = pairs_.row(of.slot, in.slot);
-    if (row.empty()) row.resize(in.candidates.size());
-    if (row[slot(c)].mass != PairTerm::kUnknown) return row[slot(c)].mass;
-  }
-  const int f = candidate.feature;
-  double mass = 0.0;
-  if (of.joint->marginal(f).determinant > 0.0) {
-    mass = candidate.clipped ? ClippedEllipse(in.ellipse(f), valid_[slot(f)])
-                                   .mass(of.mean[slot(f)], of.covariance(f))
-                             : massInEllipse(in.ellipse(f), of.mean[slot(f)], of.covariance(f));
-  }
-  if (remembered) pairs_.row(of.slot, in.slot)[slot(c)].mass = mass;
-  return mass;
+  const std::size_t f = slot(candidate.feature);
+  if (k == g || (of.entry[f] == in.entry[f] && of.entry[f] != PairTable::kNone))
+    return candidate.mass;
+  if (of.entry[f] == PairTable::kNone || in.entry[f] == PairTable::kNone)
+    return computeMass(of, in, candidate);
+  PairTerm& known = pairs_[f].term(of.entry[f], in.entry[f]);
+  if (known.mass == PairTerm::kUnknown) known.mass = computeMass(of, in, candidate);
+  return known.mass;
+}
+
+/// The factors that follow from the mass; `child`: what a match adds to others.
+void Mixture::complete(PairTerm& term, const Hypothesis::Candidate& candidate, double child) const {
+  const SearchLikelihood& likelihood = this->likelihood(candidate.feature);
+  const auto timesLog = [](double x) { return x > 0.0 ? x * std::log(x) : 0.0; };
+  const double a = term.mass;
+  term.null = likelihood.in * a + 1.0 - a;
+  // A sliver of an ellipse, clipped to less than a pixel, has no room for a second match.
+  term.match = std::max(
+      child + likelihood.in * (candidate.area - 1.0) * a + candidate.area * (1.0 - a), 0.0);
+  term.null_log = timesLog(term.null);
+  term.match_log = timesLog(term.match);
 }
 
 const PairTerm& Mixture::term(int k, int c, int g) {
   const Hypothesis& of = hypotheses_[slot(k)];
   const Hypothesis& in = hypotheses_[slot(g)];
+  const Hypothesis::Candidate& candidate = in.candidates[slot(c)];
+  const std::size_t f = slot(candidate.feature);
   PairTerm* known = &scratch_;
-  if (of.slot >= 0 && in.slot >= 0) {
-    PairTable::Row& row = pairs_.row(of.slot, in.slot);
-    if (row.empty()) row.resize(in.candidates.size());
-    known = &row[slot(c)];
+  if (of.entry[f] != PairTable::kNone && in.entry[f] != PairTable::kNone) {
+    known = &pairs_[f].term(of.entry[f], in.entry[f]);
     if (known->null != PairTerm::kUnknown) return *known;
   }
-  const Hypothesis::Candidate& candidate = in.candidates[slot(c)];
-  const SearchLikelihood& likelihood = this->likelihood(candidate.feature);
-  const auto timesLog = [](double x) { return x > 0.0 ? x * std::log(x) : 0.0; };
-  const double a = mass(k, c, g);
-  known->mass = a;
-  known->null = likelihood.in * a + 1.0 - a;
-  // A sliver of an ellipse, clipped to less than a pixel, has no room for a second match.
-  known->match =
-      std::max((k == g ? 0.0 : likelihood.match * a) + likelihood.in * (candidate.area - 1.0) * a +
-                   candidate.area * (1.0 - a),
-               0.0);
-  known->null_log = timesLog(known->null);
-  known->match_log = timesLog(known->match);
+  known->mass = mass(k, c, g);
+  complete(*known, candidate, likelihood(candidate.feature).match * known->mass);
   return *known;
+}
+
+const PairTerm& Mixture::ownTerm(int g, int c) {
+  Hypothesis::Candidate& candidate = hypotheses_[slot(g)].candidates[slot(c)];
+  if (candidate.own.null == PairTerm::kUnknown) {
+    candidate.own.mass = candidate.mass;
+    complete(candidate.own, candidate, 0.0);
+  }
+  return candidate.own;
+}
+
+void Mixture::forgetTerms() {
+  keeps_terms_ = false;
+  for (Hypothesis& h : hypotheses_) h.entry.assign(h.entry.size(), PairTable::kNone);
+  pairs_.clear();
 }
 
 bool Mixture::liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const {
@@ -122,6 +144,7 @@ void Mixture::addCandidate(Hypothesis& h, int f) const {
   const SearchEllipse ellipse = h.ellipse(f);
   Hypothesis::Candidate candidate;
   candidate.feature = f;
+  candidate.bits = marginal.information_bits;
   candidate.clipped = reachesBeyond(ellipse, valid_[slot(f)]);
   if (candidate.clipped) {
     const ClippedEllipse clipped(ellipse, valid_[slot(f)]);
@@ -143,7 +166,7 @@ void Mixture::addCandidate(Hypothesis& h, int f) const {
   h.candidates.push_back(candidate);
 }
 
-Hypothesis Mixture::spawn(const Hypothesis& parent, int f, int match) const {
+Hypothesis Mixture::spawn(const Hypothesis& parent, int f, int match) {
   Hypothesis child;
   child.parent = parent.id;
   child.joint = joint_.measure(parent.joint, f);
@@ -177,47 +200,42 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, int match) const {
     child.candidate_of[slot(t)] = static_cast<int>(child.candidates.size());
     child.candidates.push_back(parent.candidates[slot(c)]);
   }
+  takeEntries(child, parent, f, is_changed);
   return child;
 }
 
-void Mixture::inheritTerms(int born, int parent_index, int f) {
-  Hypothesis& child = hypotheses_[slot(born)];
-  const Hypothesis& parent = hypotheses_[slot(parent_index)];
-  child.slot = pairs_.acquire();
-  if (child.slot < 0 || parent.slot < 0) return;
-  // Where all has changed all is unknown.
-  std::vector<char> is_changed(child.mean.size(), 0);
-  is_changed[slot(f)] = 1;
-  for (const int t : child.joint->touched()) is_changed[slot(t)] = 1;
-  const auto fill = [&](PairTable::Row& to, const PairTable::Row& from, const Hypothesis& to_list,
-                        const Hypothesis& from_list) {
-    if (from.empty()) return;
-    for (std::size_t c = 0; c < to_list.candidates.size(); ++c) {
-      const int t = to_list.candidates[c].feature;
-      if (is_changed[slot(t)]) continue;
-      const int old = from_list.candidate_of[slot(t)];
-      if (old < 0) continue;
-      if (to.empty()) to.resize(to_list.candidates.size());
-      to[c] = from[slot(old)];
-    }
-  };
-  for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
-    const Hypothesis& other = hypotheses_[slot(k)];
-    if (other.slot < 0 || k == born || k == parent_index) continue;
-    fill(pairs_.row(other.slot, child.slot), pairs_.row(other.slot, parent.slot), child, parent);
-    fill(pairs_.row(child.slot, other.slot), pairs_.row(parent.slot, other.slot), other, other);
+/// All that have fused one match of a feature share an entry.
+int Mixture::entryOfFused(int f, int match) {
+  std::vector<FusedEntry>& known = fused_entries_[slot(f)];
+  if (known.size() <= slot(match)) known.resize(slot(match) + 1);
+  PairTable& pairs = pairs_[slot(f)];
+  FusedEntry& fused = known[slot(match)];
+  if (fused.entry != PairTable::kNone && pairs.serial(fused.entry) == fused.serial) {
+    pairs.share(fused.entry);
+  } else {
+    fused.entry = pairs.acquire();
+    fused.serial = fused.entry == PairTable::kNone ? 0 : pairs.serial(fused.entry);
   }
-  fill(pairs_.row(child.slot, child.slot), pairs_.row(parent.slot, parent.slot), child, parent);
-  // Where both have one marginal, each holds the other's own mass.
-  const auto fillOwn = [&](PairTable::Row& row, const Hypothesis& in) {
-    for (std::size_t c = 0; c < in.candidates.size(); ++c) {
-      if (is_changed[slot(in.candidates[c].feature)]) continue;
-      if (row.empty()) row.resize(in.candidates.size());
-      row[c].mass = in.candidates[c].mass;
+  return fused.entry;
+}
+
+void Mixture::takeEntries(Hypothesis& child, const Hypothesis& parent, int f,
+                          const std::vector<char>& is_changed) {
+  child.entry.assign(child.mean.size(), PairTable::kNone);
+  if (!keeps_terms_) return;
+  for (std::size_t t = 0; t < child.entry.size(); ++t) {
+    if (is_changed[t]) {
+      child.entry[t] = t == slot(f) ? entryOfFused(f, child.match[t]) : pairs_[t].acquire();
+    } else {
+      child.entry[t] = parent.entry[t];
+      pairs_[t].share(child.entry[t]);
     }
-  };
-  fillOwn(pairs_.row(parent.slot, child.slot), child);
-  fillOwn(pairs_.row(child.slot, parent.slot), parent);
+  }
+}
+
+void Mixture::releaseEntries(Hypothesis& h) {
+  if (!keeps_terms_) return;
+  for (std::size_t t = 0; t < h.entry.size(); ++t) pairs_[t].release(h.entry[t]);
 }
 
 SearchOutcome Mixture::searchOnly(int g, int c) {
@@ -238,8 +256,7 @@ void Mixture::fuse(int g, int f, int match) {
   fused.parent = h.parent;
   fused.log_weight = h.log_weight;
   fused.weight = h.weight;
-  pairs_.release(h.slot);
-  fused.slot = pairs_.acquire();
+  releaseEntries(h);
   h = std::move(fused);
 }
 

@@ -40,15 +40,17 @@ struct Hypothesis {
     bool clipped = false;       ///< the ellipse reaches beyond the valid area
     double area = 0.0;          ///< of the 3-sigma ellipse inside the valid area [px^2]
     double mass = 0.0;          ///< own probability mass inside
+    double bits = 0.0;          ///< continuous information of a match
     double child = 0.0;         ///< match * mass: a match's factor for the child
     double child_log = 0.0;     ///< child * ln(child)
+    PairTerm own;               ///< as this Gaussian sees its own search; `match` without the child
     std::int64_t checked = -1;  ///< cache of Mixture::isSterile
   };
-  /// Sum of p over the pixels searched when they were that many.
+  /// Sum of p over the first `runs` runs of the pixels searched.
   struct PixelMass {
     int feature;
     double sum;
-    std::int64_t pixels;
+    std::size_t runs;
   };
   int id = 0, parent = -1;
   double log_weight = 0.0, weight = 1.0;
@@ -59,7 +61,7 @@ struct Hypothesis {
   std::vector<Candidate> candidates;    ///< by feature, as they were at birth
   std::vector<int> candidate_of;        ///< F, index into candidates; -1: none
   std::vector<PixelMass> pixel_masses;  ///< cache
-  int slot = -1;                        ///< in the table of pairs
+  std::vector<int> entry;               ///< F, in the feature's table of pairs
 
   Eigen::Matrix2d covariance(int f) const { return joint->marginal(f).covariance; }
   SearchEllipse ellipse(int f) const {
@@ -91,8 +93,12 @@ class Mixture {
   /// Mass of hypothesis k's marginal inside g's ellipse, both of g's candidate c (indices, not
   /// ids).
   double mass(int k, int c, int g);
-  /// The same with the factors that follow from it.
+  /// The same, k != g, with the factors that follow from it.
   const PairTerm& term(int k, int c, int g);
+  /// As g sees its own search.
+  const PairTerm& ownTerm(int g, int c);
+  /// Frees what only term() needs; it is not to be asked any more.
+  void forgetTerms();
   /// Rule incremental: a search of candidate c of g would see neither a new pixel nor a match that
   /// is known but outside the ellipses that g or its ancestors searched.
   bool isSterile(int g, int c);
@@ -125,9 +131,15 @@ class Mixture {
   void updateIncremental(int g, int c, MatchStep& step, std::vector<Child>& children);
   void updateThesis(int g, int c, MatchStep& step, std::vector<Child>& children);
   void reweigh(int g, int f, const std::vector<Child>& children, MatchStep& step);
-  Hypothesis spawn(const Hypothesis& parent, int f, int match) const;
-  /// Terms that the child `born` has in common with its parent (indices).
-  void inheritTerms(int born, int parent, int f);
+  Hypothesis spawn(const Hypothesis& parent, int f, int match);
+  /// Entries of a newborn in the tables of pairs; its parent's where `is_changed` is 0.
+  void takeEntries(Hypothesis& child, const Hypothesis& parent, int f,
+                   const std::vector<char>& is_changed);
+  void releaseEntries(Hypothesis& h);
+  int entryOfFused(int f, int match);
+  double computeMass(const Hypothesis& of, const Hypothesis& in,
+                     const Hypothesis::Candidate& candidate) const;
+  void complete(PairTerm& term, const Hypothesis::Candidate& candidate, double child) const;
 
   const Joint& joint_;
   SearchLedger& ledger_;
@@ -136,8 +148,14 @@ class Mixture {
   std::vector<PixelBox> valid_;
   std::vector<Hypothesis> hypotheses_;
   std::vector<SearchedEllipse> searched_;
-  PairTable pairs_;
-  PairTerm scratch_;  // of a Gaussian without a slot
+  std::vector<PairTable> pairs_;                // by feature
+  struct FusedEntry {
+    int entry = PairTable::kNone;
+    std::int64_t serial = 0;
+  };
+  std::vector<std::vector<FusedEntry>> fused_entries_;  // by feature and match
+  bool keeps_terms_ = true;
+  PairTerm scratch_;  // of a Gaussian without an entry
   int next_id_ = 1;
   int most_gaussians_ = 1;
   bool was_capped_ = false;

@@ -80,14 +80,19 @@ Measurement MixtureRun::choose() {
   if (policy_ == Policy::kFast) {
     double most_bits = 0.0;
     const Measurement next = choice_.bestOfDrawn(options_.fast_candidates, random_, most_bits);
-    latched_ = next.exists() && most_bits < options_.fast_latch_bits;
+    if (next.exists() && most_bits < options_.fast_latch_bits) latch();
     return next;
   }
   const Measurement next = choice_.best();
   if (!next.exists() || next.expected.bits() >= options_.latch_information_bits) return next;
   if (options_.latch_information_bits <= 0.0) return next;
-  latched_ = true;
+  latch();
   return chooseAfterLatch();
+}
+
+void MixtureRun::latch() {
+  latched_ = true;
+  mixture_.forgetTerms();
 }
 
 /// The heaviest Gaussian's lowest candidate; FAM goes on to the next heaviest when it has none.

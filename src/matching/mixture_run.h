@@ -26,6 +26,7 @@ class MixtureRun {
   /// The next search, none when done. Sets the latch.
   Measurement choose();
   Measurement chooseAfterLatch();
+  void latch();
   bool isFinished() const;
   void acceptNearest(MatchResult& result);
   MatchStep begin(const Measurement& measurement) const;

@@ -18,18 +18,18 @@ std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 double Mixture::pixelMass(Hypothesis& h, int f) {
   const PixelMask& mask = ledger_.searchedPixels(f);
-  Hypothesis::PixelMass* known = nullptr;
-  for (Hypothesis::PixelMass& entry : h.pixel_masses)
-    if (entry.feature == f) known = &entry;
-  if (!known) {
-    h.pixel_masses.push_back({f, 0.0, -1});
-    known = &h.pixel_masses.back();
+  const std::vector<PixelRun>& runs = mask.history();
+  for (Hypothesis::PixelMass& known : h.pixel_masses) {
+    if (known.feature != f) continue;
+    if (known.runs < runs.size()) {
+      known.sum += massOnRuns(runs, known.runs, h.mean[slot(f)], h.covariance(f));
+      known.runs = runs.size();
+    }
+    return std::min(1.0, known.sum);
   }
-  if (known->pixels != mask.size()) {
-    known->sum = massOnPixels(mask, h.mean[slot(f)], h.covariance(f));
-    known->pixels = mask.size();
-  }
-  return std::min(1.0, known->sum);
+  const double sum = massOnPixels(mask, h.mean[slot(f)], h.covariance(f));
+  h.pixel_masses.push_back({f, sum, runs.size()});
+  return std::min(1.0, sum);
 }
 
 /// match * sum of p over the matches outside the own lineage + in * max(0, A - sum of p over all) +
@@ -177,14 +177,12 @@ void Mixture::reweigh(int g, int f, const std::vector<Child>& children, MatchSte
   normalise();
   record(step.pruned);
 
-  // Slots of what dies are free for what is born, but the parent is needed until then.
+  // Entries of what dies are free for what is born, but the parent is needed until then.
   std::vector<char> lives(hypotheses_.size(), 0);
   for (const Entry& e : entries)
     if (e.index < old_count) lives[slot(e.index)] = 1;
   for (int k = 0; k < old_count; ++k) {
-    if (lives[slot(k)] || k == g) continue;
-    pairs_.release(hypotheses_[slot(k)].slot);
-    hypotheses_[slot(k)].slot = -1;
+    if (!lives[slot(k)] && k != g) releaseEntries(hypotheses_[slot(k)]);
   }
   hypotheses_.reserve(hypotheses_.size() + entries.size());
   for (Entry& e : entries) {
@@ -192,9 +190,8 @@ void Mixture::reweigh(int g, int f, const std::vector<Child>& children, MatchSte
     hypotheses_.push_back(
         spawn(hypotheses_[slot(g)], f, children[slot(e.index - old_count)].match));
     e.index = static_cast<int>(hypotheses_.size()) - 1;
-    inheritTerms(e.index, g, f);
   }
-  if (!lives[slot(g)]) pairs_.release(hypotheses_[slot(g)].slot);
+  if (!lives[slot(g)]) releaseEntries(hypotheses_[slot(g)]);
   std::vector<Hypothesis> next;
   next.reserve(entries.size());
   for (const Entry& e : entries) {

@@ -1,41 +1,58 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace active_matching_slam {
 
-/// How a search in one Gaussian's ellipse looks from another Gaussian k: its mass a inside, and the
-/// factors that a search without and with a match gives k's weight (Chli 2009, eq. 5.13-5.17).
+/// How a search in an ellipse looks from another Gaussian: its mass a inside, and the factors that a
+/// search without and with a match gives its weight (Chli 2009, eq. 5.13-5.17).
 struct PairTerm {
   static constexpr double kUnknown = -1.0;
   double mass = kUnknown;
   double null = kUnknown;  ///< in a + 1 - a
   double null_log = 0.0;   ///< null * ln(null)
-  double match = 0.0;      ///< [k != g] match a + in (N - 1) a + N (1 - a)
+  double match = 0.0;      ///< match a + in (N - 1) a + N (1 - a)
   double match_log = 0.0;  ///< match * ln(match)
 };
 
-/// The terms of all pairs (k, g) of Gaussians, for the features that can be searched in g. A
-/// marginal never changes while its Gaussian lives, so each is computed once; with their logarithms
-/// kept too, a prediction needs none for each Gaussian. Only kSlots Gaussians are remembered, so
-/// that a crowded mixture has bounded memory.
+/// The marginals of one feature that are alive in the mixture, and the terms of all pairs of them.
+/// Gaussians whose marginals are the same, since all have fused one match, or since a tree's
+/// measurement has not touched the feature, share one entry. Only kMost are remembered, so that a
+/// crowded mixture has bounded memory.
 class PairTable {
  public:
-  static constexpr int kSlots = 64;
-  /// Terms by candidate of g; empty while all are unknown.
-  using Row = std::vector<PairTerm>;
+  static constexpr int kMost = 64;
+  static constexpr int kNone = -1;
 
-  /// A free slot, all unknown; -1 when there is none.
+  /// An entry with one user and no terms; kNone when all are taken.
   int acquire();
-  void release(int slot);
-  bool isUsed(int slot) const { return used_[static_cast<std::size_t>(slot)] != 0; }
-  /// Both slots valid.
-  Row& row(int k, int g) { return rows_[static_cast<std::size_t>(g)][static_cast<std::size_t>(k)]; }
+  /// kNone is allowed in both.
+  void share(int entry) {
+    if (entry != kNone) ++users_[static_cast<std::size_t>(entry)];
+  }
+  void release(int entry) {
+    if (entry != kNone) --users_[static_cast<std::size_t>(entry)];
+  }
+  /// Tells an entry in use from a later one in its place; 0 when nobody uses it.
+  std::int64_t serial(int entry) const {
+    return users_[static_cast<std::size_t>(entry)] > 0 ? serials_[static_cast<std::size_t>(entry)]
+                                                       : 0;
+  }
+  /// A search of the ellipse of `searcher` as `other` sees it.
+  PairTerm& term(int other, int searcher) {
+    return terms_[static_cast<std::size_t>(searcher) * stride_ + static_cast<std::size_t>(other)];
+  }
 
  private:
-  std::vector<char> used_;
-  std::vector<std::vector<Row>> rows_;  // [g][k], square
+  void grow();
+
+  std::vector<int> users_;
+  std::vector<std::int64_t> serials_;
+  std::int64_t last_serial_ = 0;
+  std::size_t stride_ = 0;
+  std::vector<PairTerm> terms_;  // [searcher][other], stride_ square
 };
 
 }  // namespace active_matching_slam

@@ -6,6 +6,7 @@ namespace active_matching_slam {
 
 void PixelMask::clear() {
   rows_.clear();
+  history_.clear();
   first_v_ = 0;
   size_ = 0;
 }
@@ -32,6 +33,7 @@ int PixelMask::insert(const PixelRun& run, std::vector<PixelRun>* added) {
   const auto take = [&](int begin, int end) {
     if (begin >= end) return;
     fresh += end - begin;
+    history_.push_back({run.v, begin, end});
     if (added) added->push_back({run.v, begin, end});
   };
   for (; last != row.end() && last->begin <= run.end_u; ++last) {

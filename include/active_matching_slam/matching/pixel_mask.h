@@ -24,6 +24,8 @@ class PixelMask {
   int countMissing(const PixelRun& run) const;
   bool contains(int u, int v) const;
   std::int64_t size() const { return size_; }
+  /// The same pixels as disjoint runs in the order in which they were added.
+  const std::vector<PixelRun>& history() const { return history_; }
 
   /// Calls f(const PixelRun&) for every run, by row then column.
   template <typename F>
@@ -39,6 +41,7 @@ class PixelMask {
   };
   int first_v_ = 0;
   std::vector<std::vector<Interval>> rows_;
+  std::vector<PixelRun> history_;
   std::int64_t size_ = 0;
 };
 
