@@ -138,8 +138,8 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   cv::setNumThreads(1);
-  for (const char* matcher : {"auto", "active", "fast_active", "chow_liu", "jcbb",
-                              "one_point_ransac", "active_search"}) {
+  for (const char* matcher :
+       {"auto", "active", "fast_active", "chow_liu", "jcbb", "one_point_ransac", "active_search"}) {
     active_matching_slam::registerFrames({matcher, 100, 640, 480, 30, false});
     active_matching_slam::registerFrames({matcher, 100, 1024, 768, 30, false});
   }

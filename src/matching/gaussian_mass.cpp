@@ -25,16 +25,20 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 class Whitener {
  public:
   explicit Whitener(const Eigen::Matrix2d& c)
-      : l00_(std::sqrt(c(0, 0))), l10_(c(0, 1) / l00_), l11_(std::sqrt(c(1, 1) - l10_ * l10_)) {}
+      : l00_(std::sqrt(c(0, 0))),
+        inverse00_(1.0 / l00_),
+        l10_(c(0, 1) * inverse00_),
+        l11_(std::sqrt(c(1, 1) - l10_ * l10_)),
+        inverse11_(1.0 / l11_) {}
   Eigen::Vector2d operator()(const Eigen::Vector2d& p) const {
-    const double x = p.x() / l00_;
-    return {x, (p.y() - l10_ * x) / l11_};
+    const double x = p.x() * inverse00_;
+    return {x, (p.y() - l10_ * x) * inverse11_};
   }
   Eigen::Vector2d column0() const { return {l00_, l10_}; }
   Eigen::Vector2d column1() const { return {0.0, l11_}; }
 
  private:
-  double l00_, l10_, l11_;
+  double l00_, inverse00_, l10_, l11_, inverse11_;
 };
 
 /// (1 - exp(-q/2)) / q

@@ -81,8 +81,8 @@ Problem readProblem(const YAML::Node& input) {
       const std::vector<double> point = numbers(p, "input.candidates" + of, 2);
       problem.points.back().emplace_back(point[0], point[1]);
     }
-    problem.scores.push_back(numbers(scores[f], "input.scores" + of,
-                                     static_cast<int>(problem.points.back().size())));
+    problem.scores.push_back(
+        numbers(scores[f], "input.scores" + of, static_cast<int>(problem.points.back().size())));
   }
   return problem;
 }

@@ -128,16 +128,14 @@ void checkTraces(const YAML::Node& file, const Problem& problem, Comparison& com
       checkTrace(name, expected, matcher, rule, problem, compare);
     });
   };
-  compare.section(file, "am_step0", [&](const YAML::Node& expected) {
-    checkFirstStep(expected, problem, compare);
-  });
+  compare.section(file, "am_step0",
+                  [&](const YAML::Node& expected) { checkFirstStep(expected, problem, compare); });
   trace("am", "active", UpdateRule::kThesis);
   trace("clam", "chow_liu", UpdateRule::kThesis);
   trace("am_incremental", "active", UpdateRule::kIncremental);
   trace("clam_incremental", "chow_liu", UpdateRule::kIncremental);
-  compare.section(file, "am_finish", [&](const YAML::Node& expected) {
-    checkFinish(expected, problem, compare);
-  });
+  compare.section(file, "am_finish",
+                  [&](const YAML::Node& expected) { checkFinish(expected, problem, compare); });
 }
 
 }  // namespace active_matching_slam::golden

@@ -64,8 +64,8 @@ ExpectedInformation MeasurementChoice::evaluate(int g, int c) {
     match_log += weighted_log * term.match + weight * term.match_log;
   };
   for (const Group& group : groupsOf(gate.feature)) {
-    const bool is_own = own_entry == PairTable::kNone ? group.representative == g
-                                                      : group.entry == own_entry;
+    const bool is_own =
+        own_entry == PairTable::kNone ? group.representative == g : group.entry == own_entry;
     if (!is_own) {
       add(mixture_.term(group.representative, c, g), group.weight, group.weighted_log);
     } else if (group.members > 1) {
@@ -136,8 +136,8 @@ Measurement MeasurementChoice::best() {
       if (!gate.open) continue;
       const double score = best.exists() ? best.expected.score : 0.0;
       // The first test is a weaker bound that costs next to nothing.
-      if (best.exists() && ((entropy_ + gate.bits) * (1.0 + 1e-9) < score * gate.area ||
-                            bound(h, gate) < score))
+      if (best.exists() &&
+          ((entropy_ + gate.bits) * (1.0 + 1e-9) < score * gate.area || bound(h, gate) < score))
         continue;
       consider(g, c);
     }

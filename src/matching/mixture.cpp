@@ -47,10 +47,9 @@ double Mixture::computeMass(const Hypothesis& of, const Hypothesis& in,
                             const Hypothesis::Candidate& candidate) const {
   const int f = candidate.feature;
   if (!(of.joint->marginal(f).determinant > 0.0)) return 0.0;
-  return candidate.clipped
-             ? ClippedEllipse(in.ellipse(f), valid_[slot(f)])
-                   .mass(of.mean[slot(f)], of.covariance(f))
-             : massInEllipse(in.ellipse(f), of.mean[slot(f)], of.covariance(f));
+  return candidate.clipped ? ClippedEllipse(in.ellipse(f), valid_[slot(f)])
+                                 .mass(of.mean[slot(f)], of.covariance(f))
+                           : massInEllipse(in.ellipse(f), of.mean[slot(f)], of.covariance(f));
 }
 
 double Mixture::mass(int k, int c, int g) {
@@ -96,12 +95,14 @@ const PairTerm& Mixture::term(int k, int c, int g) {
 }
 
 const PairTerm& Mixture::ownTerm(int g, int c) {
-  Hypothesis::Candidate& candidate = hypotheses_[slot(g)].candidates[slot(c)];
-  if (candidate.own.null == PairTerm::kUnknown) {
-    candidate.own.mass = candidate.mass;
-    complete(candidate.own, candidate, 0.0);
-  }
-  return candidate.own;
+  const Hypothesis& h = hypotheses_[slot(g)];
+  const Hypothesis::Candidate& candidate = h.candidates[slot(c)];
+  const std::size_t f = slot(candidate.feature);
+  PairTerm& own = h.entry[f] == PairTable::kNone ? scratch_ : pairs_[f].own(h.entry[f]);
+  if (h.entry[f] != PairTable::kNone && own.null != PairTerm::kUnknown) return own;
+  own.mass = candidate.mass;
+  complete(own, candidate, 0.0);
+  return own;
 }
 
 void Mixture::forgetTerms() {
@@ -121,7 +122,8 @@ bool Mixture::isSterile(int g, int c) {
   Hypothesis& h = hypotheses_[slot(g)];
   Hypothesis::Candidate& candidate = h.candidates[slot(c)];
   const int f = candidate.feature;
-  const std::int64_t pixels = ledger_.searchedPixels(f).size();
+  const PixelMask& searched = ledger_.searchedPixels(f);
+  const std::int64_t pixels = searched.size();
   const std::vector<SearchMatch>& known = ledger_.matches(f);
   if (pixels == 0 && candidate.area > kSurelyHoldsAPixel && !candidate.clipped) return false;
   // Both only grow, so their sum tells whether anything has changed since the last look.
@@ -129,7 +131,10 @@ bool Mixture::isSterile(int g, int c) {
   if (candidate.checked >= 0 && candidate.checked / 2 == state / 2)
     return candidate.checked % 2 == 1;
   const SearchEllipse ellipse = h.ellipse(f);
-  bool sterile = ledger_.countNewPixels(f, ellipse) == 0;
+  bool sterile = true;
+  forEachEllipseRun(ellipse, valid_[slot(f)], [&](const PixelRun& run) {
+    if (sterile) sterile = searched.countMissing(run) == 0;
+  });
   for (std::size_t m = 0; m < known.size() && sterile; ++m)
     sterile = !(mahalanobisSquared(ellipse, known[m].pixel) <= kEllipseRadius2) ||
               liesInLineage(h, f, known[m].pixel);

@@ -43,7 +43,6 @@ struct Hypothesis {
     double bits = 0.0;          ///< continuous information of a match
     double child = 0.0;         ///< match * mass: a match's factor for the child
     double child_log = 0.0;     ///< child * ln(child)
-    PairTerm own;               ///< as this Gaussian sees its own search; `match` without the child
     std::int64_t checked = -1;  ///< cache of Mixture::isSterile
   };
   /// Sum of p over the first `runs` runs of the pixels searched.
@@ -95,7 +94,7 @@ class Mixture {
   double mass(int k, int c, int g);
   /// The same, k != g, with the factors that follow from it.
   const PairTerm& term(int k, int c, int g);
-  /// As g sees its own search.
+  /// As g sees its own search; what a match adds goes to the child.
   const PairTerm& ownTerm(int g, int c);
   /// Frees what only term() needs; it is not to be asked any more.
   void forgetTerms();
@@ -148,7 +147,7 @@ class Mixture {
   std::vector<PixelBox> valid_;
   std::vector<Hypothesis> hypotheses_;
   std::vector<SearchedEllipse> searched_;
-  std::vector<PairTable> pairs_;                // by feature
+  std::vector<PairTable> pairs_;  // by feature
   struct FusedEntry {
     int entry = PairTable::kNone;
     std::int64_t serial = 0;

@@ -104,8 +104,8 @@ MatchResult ChowLiuMatcher::match(const MeasurementPrior& given, FeatureSearch& 
 
 MatchResult AutoMatcher::match(const MeasurementPrior& prior, FeatureSearch& search,
                                const MatchOptions& options) {
-  const double limit =
-      options.max_milliseconds > 0.0 ? options.max_milliseconds : options.auto_milliseconds;
+  double limit = options.auto_milliseconds;
+  if (options.max_milliseconds > 0.0) limit = std::min(limit, options.max_milliseconds);
   if (modelledMilliseconds(prior, options) <= limit) return active_.match(prior, search, options);
   return chow_liu_.match(prior, search, options);
 }

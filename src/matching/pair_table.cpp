@@ -11,10 +11,12 @@ int PairTable::acquire() {
   if (free == users_.end()) {
     users_.push_back(0);
     serials_.push_back(0);
+    own_.emplace_back();
   }
   if (users_.size() > stride_) grow();
   users_[entry] = 1;
   serials_[entry] = ++last_serial_;
+  own_[entry].null = PairTerm::kUnknown;
   for (std::size_t other = 0; other < users_.size(); ++other) {
     terms_[entry * stride_ + other].mass = terms_[entry * stride_ + other].null =
         PairTerm::kUnknown;

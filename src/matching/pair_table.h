@@ -6,8 +6,8 @@
 
 namespace active_matching_slam {
 
-/// How a search in an ellipse looks from another Gaussian: its mass a inside, and the factors that a
-/// search without and with a match gives its weight (Chli 2009, eq. 5.13-5.17).
+/// How a search in an ellipse looks from another Gaussian: its mass a inside, and the factors that
+/// a search without and with a match gives its weight (Chli 2009, eq. 5.13-5.17).
 struct PairTerm {
   static constexpr double kUnknown = -1.0;
   double mass = kUnknown;
@@ -44,6 +44,8 @@ class PairTable {
   PairTerm& term(int other, int searcher) {
     return terms_[static_cast<std::size_t>(searcher) * stride_ + static_cast<std::size_t>(other)];
   }
+  /// The searcher's own view, in which a match adds nothing to it.
+  PairTerm& own(int searcher) { return own_[static_cast<std::size_t>(searcher)]; }
 
  private:
   void grow();
@@ -51,6 +53,7 @@ class PairTable {
   std::vector<int> users_;
   std::vector<std::int64_t> serials_;
   std::int64_t last_serial_ = 0;
+  std::vector<PairTerm> own_;
   std::size_t stride_ = 0;
   std::vector<PairTerm> terms_;  // [searcher][other], stride_ square
 };

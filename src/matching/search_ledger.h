@@ -17,9 +17,6 @@ class SearchLedger {
 
   /// Searches the feature (index in the proper prior).
   SearchOutcome search(int feature, const SearchEllipse& ellipse);
-  int countNewPixels(int feature, const SearchEllipse& ellipse) const {
-    return search_.countNewPixels(prior_.original(feature), ellipse);
-  }
   const std::vector<SearchMatch>& matches(int feature) const {
     return search_.matches(prior_.original(feature));
   }

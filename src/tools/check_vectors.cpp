@@ -11,7 +11,8 @@ namespace {
 constexpr int kFault = 2;
 constexpr const char* kUsage =
     "check_vectors FOLDER\n"
-    "  Runs the matchers on every golden vector (*.json) of the folder. A line for each, the first\n"
+    "  Runs the matchers on every golden vector (*.json) of the folder. A line for each, the "
+    "first\n"
     "  differences below it, and 'N passed, N failed' last. The exit status is 0 when all passed,\n"
     "  1 when one failed or there was none, 2 for wrong use.\n";
 

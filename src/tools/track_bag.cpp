@@ -2,6 +2,7 @@
 
 #include <console_bridge/console.h>
 
+#include <algorithm>
 #include <boost/filesystem.hpp>
 #include <boost/program_options.hpp>
 #include <cstdio>
@@ -89,7 +90,8 @@ TrackerOptions trackerOptionsOf(const Settings& settings) {
   // A budget of time would make the result depend on the machine. What it means for the choice of a
   // matcher, which follows a model of the cost and no clock, stays.
   if (options.matching.max_milliseconds > 0.0)
-    options.matching.auto_milliseconds = options.matching.max_milliseconds;
+    options.matching.auto_milliseconds =
+        std::min(options.matching.auto_milliseconds, options.matching.max_milliseconds);
   options.matching.max_milliseconds = 0.0;
   checkTrackerOptions(options);
   return options;

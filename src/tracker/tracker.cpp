@@ -53,6 +53,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
   filter_.setOptions(options.filter);
   relocaliser_ = Relocaliser(camera_, {}, options.map, options.image);
   search_ = ImageFeatureSearch(options.image);
+  second_search_ = ImageFeatureSearch(options.image);
   options_ = options;
 }
 

@@ -24,6 +24,7 @@ class Tracker::Implementation {
         options_(options),
         filter_(options.filter),
         search_(options.image),
+        second_search_(options.image),
         relocaliser_(camera, {}, options.map, options.image),
         matcher_(createMatcher(options.matcher)),
         second_matcher_(createMatcher("one_point_ransac")) {
@@ -64,7 +65,7 @@ class Tracker::Implementation {
   Ekf filter_;
   StartAdjustment start_adjustment_;
   FeatureMap map_;
-  ImageFeatureSearch search_;
+  ImageFeatureSearch search_, second_search_;
   Relocaliser relocaliser_;
   std::unique_ptr<Matcher> matcher_, second_matcher_;
   MapStructure structure_;

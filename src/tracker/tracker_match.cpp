@@ -64,16 +64,15 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   const double expected = map_.expectedMatches(candidates_);
   const int matched = frame->matching.statistics.matched;
   if (expected < 8.0 || matched > kPoorShare * expected) return;
-  search_.beginFrame(image, templates_);
-  MatchResult second = second_matcher_->match(prior_, search_, options_.matching);
-  second.statistics.pixels_searched += frame->matching.statistics.pixels_searched;
-  second.statistics.total_ms += frame->matching.statistics.total_ms;
+  second_search_.beginFrame(image, templates_);
+  MatchResult second = second_matcher_->match(prior_, second_search_, options_.matching);
+  const double both_ms = second.statistics.total_ms + frame->matching.statistics.total_ms;
   if (second.statistics.matched >= matched) {
+    second.statistics.pixels_searched += frame->matching.statistics.pixels_searched;
     frame->matching = std::move(second);
-    return;
+    std::swap(search_, second_search_);  // match indices belong to the search that found them
   }
-  search_.beginFrame(image, templates_);  // match indices belong to the search that found them
-  frame->matching = matcher_->match(prior_, search_, options_.matching);
+  frame->matching.statistics.total_ms = both_ms;
 }
 
 /// Fuses the accepted matches.

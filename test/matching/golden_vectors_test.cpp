@@ -57,7 +57,8 @@ TEST(GoldenVectors, PassOverPartsThatAreAbsentNullOrUnknown) {
 
 TEST(GoldenVectors, NameWhatDiffersAndWhatIsMissing) {
   const std::string head = std::string("{\"format\": 1, ") + kInput;
-  EXPECT_EQ("nearest is [0, 0], must be [0, -1]", firstDifference(head + R"(, "nearest": [0, -1]})"));
+  EXPECT_EQ("nearest is [0, 0], must be [0, -1]",
+            firstDifference(head + R"(, "nearest": [0, -1]})"));
   EXPECT_EQ("jcbb.pairings is missing in the file",
             firstDifference(head + R"(, "jcbb": {"assoc": [0, 0]}})"));
   EXPECT_EQ("ransac1.inliers is not of the right type in the file",

@@ -35,8 +35,8 @@ struct MatchOptions {
   // Budget of a frame: active, fast_active, chow_liu, jcbb (time).
   std::int64_t max_pixels = 0;    ///< distinct pixels searched; 0: no limit
   double max_milliseconds = 0.0;  ///< 0: no limit
-  /// auto: active is taken while its modelled cost is below max_milliseconds or, without that
-  /// limit, below this. The model counts features and expected matches; no clock decides.
+  /// auto: active is taken while its modelled cost is below this (and below max_milliseconds, if
+  /// set), else chow_liu. The model counts features and expected matches; no clock decides.
   double auto_milliseconds = 10.0;
   /// Monotonic clock of the budget and of the reported durations, in seconds; empty: steady_clock.
   std::function<double()> clock_s;

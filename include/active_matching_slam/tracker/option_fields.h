@@ -130,8 +130,8 @@ void visitOptions(Options& o, Visitor&& visit) {
   visit(F{"matching/max_pixels", "distinct pixels searched in a frame; 0: no limit", true},
         o.matching.max_pixels, std::int64_t{0}, std::int64_t{1} << 40);
   visit(F{"matching/max_milliseconds",
-          "time for matching a frame [ms]; 0: no limit. Results then "
-          "depend on the machine",
+          "time for matching a frame [ms]; 0: no limit. track_bag, which "
+          "repeats bit for bit, has none",
           true},
         o.matching.max_milliseconds, 0.0, 1e6);
   visit(F{"matching/jcbb_max_nodes", "jcbb: nodes visited in a frame; 0: no limit", true},
