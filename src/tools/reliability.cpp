@@ -45,7 +45,7 @@ void writePlot(const Bins& bins, const std::string& title, const std::string& pa
   const cv::Scalar grey(150, 150, 150), blue(180, 90, 20);
   cv::Mat image(kTop + kSide + 60, kLeft + kSide + 30, CV_8UC3, cv::Scalar(255, 255, 255));
   PlotCanvas canvas(&image, cv::Rect(kLeft, kTop, kSide, kSide), {0.5, 0.5}, kSide / 1.1);
-  canvas.drawGrid("weight of the accepted hypothesis", "share of frames that were right", title);
+  canvas.drawGrid("weight of the accepted hypothesis", "share right", title);
   canvas.polyline({{0.0, 0.0}, {1.0, 1.0}}, grey, 1);
   for (const ReliabilityBin& bin : bins) {
     if (bin.frames == 0) continue;
@@ -86,7 +86,7 @@ int run(int argc, char** argv) {
   if (output.empty()) return 0;
   std::filesystem::create_directories(output);
   writeCsv(measured, output + "/reliability.csv");
-  writePlot(measured, matcher + ", " + std::to_string(frames) + " frames, bars of 2 sigma",
+  writePlot(measured, matcher + ", " + std::to_string(frames) + " frames, 2 sigma",
             output + "/reliability.png");
   std::printf("written to %s\n", output.c_str());
   return 0;
