@@ -13,6 +13,7 @@ namespace {
 /// no more beyond.
 constexpr double kFirstParallaxPx = 0.5, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
 constexpr double kGrowthInDoubt = 1.25;    ///< the factor when the images leave a doubt
+constexpr std::size_t kFewImages = 12;     ///< that tell the readings of the images apart
 constexpr std::size_t kMostImages = 48;    ///< kept
 constexpr std::size_t kLeastPoints = 8;    ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;         ///< of a feature that takes part
@@ -66,6 +67,49 @@ FeatureState seenFromOrigin(const FeatureState& feature) {
       std::abs(m.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
   seen.tangent_world = (axis - m * m.dot(axis)).normalized();
   return seen;
+}
+
+std::size_t countPoints(const Bundle& bundle) {
+  std::size_t points = 0;
+  for (const auto& observations : bundle.observations) points += observations.size();
+  return points;
+}
+
+/// Every how many images one is taken, counted from the last, so that few remain.
+std::size_t stride(const Bundle& bundle) {
+  return (bundle.cameras.size() + kFewImages - 1) / kFewImages;
+}
+
+/// The first image, the last, and some between.
+Bundle someImages(const Bundle& bundle) {
+  Bundle some;
+  some.features = bundle.features;
+  const std::size_t last = bundle.cameras.size() - 1;
+  for (std::size_t k = 0; k <= last; ++k) {
+    if (k != 0 && (last - k) % stride(bundle) != 0) continue;
+    some.cameras.push_back(bundle.cameras[k]);
+    some.observations.push_back(bundle.observations[k]);
+  }
+  return some;
+}
+
+/// All images of `bundle`: features as in `some`, its cameras where it has them, and the others
+/// moved as the next one that it has.
+Bundle allImages(const Bundle& some, const Bundle& bundle) {
+  Bundle all = bundle;
+  all.features = some.features;
+  const std::size_t last = bundle.cameras.size() - 1;
+  std::size_t next = 1;
+  for (std::size_t k = 1; k <= last; ++k) {
+    const std::size_t there = k + (last - k) % stride(bundle);  // the next that `some` has
+    const Eigen::Isometry3d correction =
+        some.cameras[next].poseWorldCamera() * bundle.cameras[there].poseWorldCamera().inverse();
+    const Eigen::Isometry3d T_world_camera = correction * bundle.cameras[k].poseWorldCamera();
+    all.cameras[k].position_world = T_world_camera.translation();
+    all.cameras[k].q_world_camera = Eigen::Quaterniond(T_world_camera.linear()).normalized();
+    if (k == there) ++next;
+  }
+  return all;
 }
 
 /// All at one depth, and cameras that only turned.
@@ -227,11 +271,8 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
 
   std::vector<FeatureId> ids;
   Bundle believed = makeBundle(filter, &ids);
-  std::size_t points = 0;
-  for (const auto& observations : believed.observations) {
+  for (const auto& observations : believed.observations)
     if (observations.size() < kLeastPoints) return std::nullopt;
-    points += observations.size();
-  }
   BundleOptions options;
   options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
   options.sigma_px = filter.options().sigma_px;
@@ -239,8 +280,10 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
   options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
 
-  std::vector<Bundle> readings{believed, believed};
-  normalise(options.inverse_depth, &readings[0]);  // a known scale may have been set
+  // Some of the images are enough to tell the readings apart.
+  Bundle rest = believed;
+  normalise(options.inverse_depth, &rest);  // a known scale may have been set
+  std::vector<Bundle> readings(2, someImages(rest));
   flatten(model, options.inverse_depth, &readings[1]);
   std::vector<double> costs;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -254,37 +297,38 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   const auto best =
       static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   // Images are often better than assumed.
-  const double noise =
-      std::clamp(costs[best] / (2.0 * static_cast<double>(points)), kLeastNoiseShare, 1.0);
-  bool in_doubt = costs[best] > kMostCostPerPoint * static_cast<double>(points);
+  const auto some_points = static_cast<double>(countPoints(readings[best]));
+  const double noise = std::clamp(costs[best] / (2.0 * some_points), kLeastNoiseShare, 1.0);
+  bool in_doubt = costs[best] > kMostCostPerPoint * some_points;
   for (std::size_t i = 0; i < costs.size(); ++i)
     in_doubt |= costs[i] < costs[best] + kLeastCostGap * noise &&
                 !isSameReading(readings[i], readings[best]);
   if (parallax) next_parallax_px_ = (in_doubt ? kGrowthInDoubt : kParallaxGrowth) * *parallax;
   if (in_doubt) return std::nullopt;
 
+  Bundle reading = allImages(readings[best], rest);
+  adjustBundle(model, options, &reading);
   // Corners where something near hides something far wander by less than would make them outliers;
   // most image points are much better than that.
-  const double equations = 2.0 * static_cast<double>(points);
+  const double equations = 2.0 * static_cast<double>(countPoints(believed));
   const double unknowns =
       3.0 * static_cast<double>(ids.size()) + 6.0 * static_cast<double>(images_.size() - 1);
   const double freedom = std::max(equations - unknowns, 0.1 * equations);
-  const double scale =
-      medianOf(featureErrors(model, readings[best])) * std::sqrt(equations / freedom);
+  const double scale = medianOf(featureErrors(model, reading)) * std::sqrt(equations / freedom);
   options.outlier_px =
       std::clamp(kOutlierSigmas * scale, kLeastOutlierPx, kOutlierSigmas * options.sigma_px);
   BundleOptions fine = options;
   fine.sigma_px = options.outlier_px / kOutlierSigmas;
-  adjustBundle(model, fine, &readings[best]);
-  dropWanderers(model, options.outlier_px, &readings[best], &believed, &ids);
-  keepUnit(believed, &readings[best]);
+  adjustBundle(model, fine, &reading);
+  dropWanderers(model, options.outlier_px, &reading, &believed, &ids);
+  keepUnit(believed, &reading);
   options.sigma_px = std::min(options.sigma_px, fine.sigma_px);
-  auto start = makeState(model, filter, options, readings[best], ids);
+  auto start = makeState(model, filter, options, reading, ids);
   if (!start) return std::nullopt;
   for (std::size_t k = 0; k < images_.size(); ++k) {
     start->moves.push_back({images_[k].index, images_[k].camera.poseWorldCamera(),
-                            readings[best].cameras[k].poseWorldCamera()});
-    images_[k].camera = readings[best].cameras[k];
+                            reading.cameras[k].poseWorldCamera()});
+    images_[k].camera = reading.cameras[k];
   }
   return start;
 }
