@@ -22,14 +22,20 @@ void PoseBroadcaster::reset(bool time_jumped) {
 std::optional<Eigen::Isometry3d> PoseBroadcaster::lookup(const std::string& target,
                                                          const std::string& source,
                                                          const ros::Time& stamp) {
-  try {
-    return fromTransformMsg(
-        buffer_.lookupTransform(target, source, stamp, ros::Duration(options_.tf_timeout_s))
-            .transform);
-  } catch (const tf2::TransformException& error) {
-    warning_.say(source + target,
-                 "No transform from " + source + " to " + target + " on tf: " + error.what());
-    return std::nullopt;
+  // The wait is of real time: one of simulated time would not end while that clock stands still.
+  // There is none for frames that nothing connects.
+  const ros::WallTime deadline = ros::WallTime::now() + ros::WallDuration(options_.tf_timeout_s);
+  for (;;) {
+    try {
+      return fromTransformMsg(buffer_.lookupTransform(target, source, stamp).transform);
+    } catch (const tf2::TransformException& error) {
+      if (ros::WallTime::now() >= deadline || !buffer_.canTransform(target, source, ros::Time(0))) {
+        warning_.say(source + target,
+                     "No transform from " + source + " to " + target + " on tf: " + error.what());
+        return std::nullopt;
+      }
+    }
+    ros::WallDuration(0.002).sleep();
   }
 }
 
