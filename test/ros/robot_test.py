@@ -6,6 +6,7 @@ Parameters: ~bag. Nodes under test: /robot (map_to_odom), /base (camera, base_fr
 /silent (no images).
 """
 
+import copy
 import math
 import struct
 import sys
@@ -140,7 +141,7 @@ class RobotTest(unittest.TestCase):
         feeder.calibrate(self.recording.info)
         for index in range(5):
             raw = self.recording.images[index]
-            image = CompressedImage(header=raw.header, format='png',
+            image = CompressedImage(header=copy.deepcopy(raw.header), format='png',
                                     data=png(harness.pixels_of(raw)))
             state = feeder.feed(image)
         self.assertEqual(TrackingState.TRACKING, state.state, state.reason)
