@@ -125,4 +125,10 @@ CameraCalibration cropAndBin(const CameraCalibration& full, int roi_x, int roi_y
   return delivered;
 }
 
+bool sameImaging(const CameraCalibration& a, const CameraCalibration& b) {
+  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
+         a.cx == b.cx && a.cy == b.cy && a.distortion_model == b.distortion_model &&
+         a.distortion == b.distortion;
+}
+
 }  // namespace active_matching_slam

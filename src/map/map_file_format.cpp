@@ -17,6 +17,7 @@ constexpr std::size_t kHeaderSize = 8 + 4 + 4 + 8;
 constexpr std::size_t kMaximumName = 1024, kMaximumDistortion = 16;
 constexpr std::size_t kMinimumFeature = 8 + 1 + 13 * 8;  ///< bytes of a FeatureState
 constexpr int kMaximumPatchSize = 255;
+constexpr std::int64_t kMaximumRateCount = std::int64_t{1} << 53;
 
 class Writer {
  public:
@@ -167,6 +168,9 @@ void write(const MapFeature& feature, Writer* out) {
   out->integer(feature.attempts);
   out->integer(feature.successes);
   out->real(feature.recent_rate);
+  for (const std::int64_t count : {feature.rates.successes, feature.rates.failures,
+                                   feature.rates.spurious, feature.rates.pixels})
+    out->integer(count);
   out->integer(feature.first_frame);
   out->integer(feature.last_matched_frame);
   const SourcePatch& patch = feature.patch;
@@ -187,6 +191,9 @@ MapFeature readMapFeature(Reader* in) {
   feature.attempts = in->smallInteger("searches of a feature", 0, kMaximumCount);
   feature.successes = in->smallInteger("matches of a feature", 0, feature.attempts);
   feature.recent_rate = in->real();
+  for (std::int64_t* count : {&feature.rates.successes, &feature.rates.failures,
+                              &feature.rates.spurious, &feature.rates.pixels})
+    *count = in->integer("a count of a feature's rates", 0, kMaximumRateCount);
   feature.first_frame = in->integer();
   feature.last_matched_frame = in->integer();
   SourcePatch& patch = feature.patch;

@@ -1,6 +1,9 @@
 #include "orb_corners.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -9,22 +12,24 @@ namespace {
 
 constexpr int kPatchSize = 31, kRadius = kPatchSize / 2;
 constexpr int kCornersOfScale = 1000;
-constexpr double kScales[] = {1.6, 1.26, 1.0, 0.8, 0.63, 0.5};
+constexpr double kScales[] = {1.6, 1.26, 1.0, 0.8, 0.63, 0.5};  // the longest work first
 
 /// Direction from a point to the centroid of intensity of the disc around it, as ORB defines it.
 /// Points of the disc outside the image are left out together with their opposites.
 float orientation(const cv::Mat& image, const cv::Point& center) {
-  double sum_x = 0.0, sum_y = 0.0;
-  for (int y = -kRadius; y <= kRadius; ++y) {
-    for (int x = -kRadius; x <= kRadius; ++x) {
-      if (x * x + y * y > kRadius * kRadius) continue;
-      const cv::Point point = center + cv::Point(x, y), opposite = center - cv::Point(x, y);
-      const cv::Rect area(0, 0, image.cols, image.rows);
-      if (!area.contains(point) || !area.contains(opposite)) continue;
-      const int value = image.at<std::uint8_t>(point);
-      sum_x += x * value;
-      sum_y += y * value;
+  const int reach_x = std::min({kRadius, center.x, image.cols - 1 - center.x});
+  const int reach_y = std::min({kRadius, center.y, image.rows - 1 - center.y});
+  int sum_x = 0, sum_y = 0;
+  for (int y = -reach_y; y <= reach_y; ++y) {
+    const auto half = static_cast<int>(std::sqrt(double(kRadius * kRadius - y * y)));
+    const int reach = std::min(reach_x, half);
+    const std::uint8_t* row = image.ptr<std::uint8_t>(center.y + y) + center.x;
+    int sum = 0;
+    for (int x = -reach; x <= reach; ++x) {
+      sum += row[x];
+      sum_x += x * row[x];
     }
+    sum_y += y * sum;
   }
   return cv::fastAtan2(static_cast<float>(sum_y), static_cast<float>(sum_x));
 }
@@ -38,33 +43,44 @@ cv::KeyPoint keypointAt(const cv::Mat& image, const cv::Point& point) {
   return {cv::Point2f(point), static_cast<float>(kPatchSize), orientation(image, point), 0.0f, 0};
 }
 
+DescribedPoints describeCornersAtScale(const cv::Mat& image, double scale) {
+  DescribedPoints result;
+  cv::Mat scaled;
+  cv::resize(image, scaled, cv::Size(), scale, scale,
+             scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
+  if (scaled.cols < 2 * kPatchSize || scaled.rows < 2 * kPatchSize) return result;
+  std::vector<cv::Point2f> corners;
+  cv::goodFeaturesToTrack(scaled, corners, kCornersOfScale, 0.005, 4.0);
+  std::vector<cv::KeyPoint> keypoints;
+  for (const cv::Point2f& corner : corners) {
+    const cv::Point point(cvRound(corner.x), cvRound(corner.y));
+    if (point.x >= kRadius && point.y >= kRadius && point.x < scaled.cols - kRadius &&
+        point.y < scaled.rows - kRadius)
+      keypoints.push_back(keypointAt(scaled, point));
+  }
+  if (!keypoints.empty()) createDescriber()->compute(scaled, keypoints, result.descriptors);
+  const double factor_u = static_cast<double>(image.cols) / scaled.cols;
+  const double factor_v = static_cast<double>(image.rows) / scaled.rows;
+  for (const cv::KeyPoint& keypoint : keypoints)
+    result.pixels.emplace_back((keypoint.pt.x + 0.5) * factor_u - 0.5,
+                               (keypoint.pt.y + 0.5) * factor_v - 0.5);
+  return result;
+}
+
 }  // namespace
 
 DescribedPoints describeCorners(const cv::Mat& image) {
+  std::array<DescribedPoints, std::size(kScales)> of_scale;
+  const auto describe = [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i)
+      of_scale[i] = describeCornersAtScale(image, kScales[i]);
+  };
+  const auto count = static_cast<int>(of_scale.size());
+  cv::parallel_for_(cv::Range(0, count), describe, count);
   DescribedPoints result;
-  const auto orb = createDescriber();
-  for (const double scale : kScales) {
-    cv::Mat scaled;
-    cv::resize(image, scaled, cv::Size(), scale, scale,
-               scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
-    if (scaled.cols < 2 * kPatchSize || scaled.rows < 2 * kPatchSize) continue;
-    std::vector<cv::Point2f> corners;
-    cv::goodFeaturesToTrack(scaled, corners, kCornersOfScale, 0.005, 4.0);
-    std::vector<cv::KeyPoint> keypoints;
-    for (const cv::Point2f& corner : corners) {
-      const cv::Point point(cvRound(corner.x), cvRound(corner.y));
-      if (point.x >= kRadius && point.y >= kRadius && point.x < scaled.cols - kRadius &&
-          point.y < scaled.rows - kRadius)
-        keypoints.push_back(keypointAt(scaled, point));
-    }
-    cv::Mat descriptors;
-    if (!keypoints.empty()) orb->compute(scaled, keypoints, descriptors);
-    const double factor_u = static_cast<double>(image.cols) / scaled.cols;
-    const double factor_v = static_cast<double>(image.rows) / scaled.rows;
-    for (const cv::KeyPoint& keypoint : keypoints)
-      result.pixels.emplace_back((keypoint.pt.x + 0.5) * factor_u - 0.5,
-                                 (keypoint.pt.y + 0.5) * factor_v - 0.5);
-    result.descriptors.push_back(descriptors);
+  for (const DescribedPoints& points : of_scale) {
+    result.pixels.insert(result.pixels.end(), points.pixels.begin(), points.pixels.end());
+    if (!points.pixels.empty()) result.descriptors.push_back(points.descriptors);
   }
   return result;
 }

@@ -12,7 +12,7 @@ struct DescribedPoints {
   cv::Mat descriptors;  ///< a row of 32 bytes for each
 };
 
-/// Corners of an 8-bit grey image at scales from enlarged to half, in ascending scale.
+/// Corners of an 8-bit grey image at scales from enlarged to half, the largest first.
 DescribedPoints describeCorners(const cv::Mat& image);
 
 /// Descriptor (1 x 32) at a point of a small image, by the same rules; empty when it has none.

@@ -80,7 +80,6 @@ std::vector<double> knownCoefficients(const sensor_msgs::CameraInfo& message,
 
 cv::Mat toGrayImage(const sensor_msgs::Image& message) {
   checkLayout(message);
-  if (message.width == 0 || message.height == 0) throw std::runtime_error("the image is empty");
   try {
     sensor_msgs::ImageConstPtr source(&message, [](const sensor_msgs::Image*) {});
     if (const std::string encoding = colorEncoding(message.encoding);

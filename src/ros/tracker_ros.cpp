@@ -55,7 +55,9 @@ TrackerRos::TrackerRos(const ros::NodeHandle& node, const ros::NodeHandle& priva
                                         << subscription_->infoTopic() << "; " << scale);
 }
 
+// A nodelet's callbacks run in other threads. Each source of them ends before what it asks.
 TrackerRos::~TrackerRos() {
+  diagnostics_.stop();
   services_.clear();
   reconfigure_.reset();
   subscription_.reset();

@@ -25,20 +25,24 @@ bool TrackingSession::updateCamera(const CameraImage& image) {
   }
   if (image.info != info_) {
     info_ = image.info;
-    const bool changed = tracker_ != nullptr;
-    tracker_.reset();
-    calibration_fault_.clear();
     try {
-      calibration_ = toCalibration(*info_);
-      tracker_ = std::make_unique<Tracker>(CameraModel(calibration_), demandedOptions());
-      ++generation_;
-      if (changed) ROS_WARN("camera_info has changed: started anew with an empty map");
+      takeCalibration(toCalibration(*info_));
+      calibration_fault_.clear();
     } catch (const std::exception& error) {
       calibration_fault_ = error.what();
     }
   }
-  if (!tracker_) fault_ = calibration_fault_;
-  return tracker_ != nullptr;
+  fault_ = calibration_fault_;
+  return fault_.empty();
+}
+
+void TrackingSession::takeCalibration(const CameraCalibration& calibration) {
+  if (tracker_ && sameImaging(calibration, calibration_)) return;
+  auto tracker = std::make_unique<Tracker>(CameraModel(calibration), demandedOptions());
+  if (tracker_) ROS_WARN("camera_info has changed: started anew with an empty map");
+  tracker_ = std::move(tracker);
+  calibration_ = calibration;
+  ++generation_;
 }
 
 std::shared_ptr<const TrackedFrame> TrackingSession::process(const CameraImage& image) {

@@ -92,6 +92,25 @@ bool Tracker::Implementation::accept(const cv::Mat& image, double stamp_s, Track
   return false;
 }
 
+/// The usual way of an image, once the state is predicted.
+void Tracker::Implementation::follow(const cv::Mat& image, TrackedFrame* frame) {
+  StopWatch stage;
+  measure(image);
+  frame->timings_ms.measure = stage.lap();
+  if (options_.structure) observeStructure();
+  frame->timings_ms.structure = stage.lap();
+  match(image, frame);
+  frame->timings_ms.match = stage.lap();
+  correct(frame);
+  if (start_adjustment_.isActive()) adjustStart(frame);
+  frame->timings_ms.update = stage.lap();
+  judge();
+  maintainMap(image, frame);
+  frame->timings_ms.map = stage.lap();
+  if (options_.structure) updateStructure(frame);
+  frame->timings_ms.structure += stage.lap();
+}
+
 std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat& image,
                                                                    double stamp_s) {
   auto frame = std::make_shared<TrackedFrame>();
@@ -116,23 +135,12 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     relocalise(image, frame.get());
   } else if (!frame->repeated_image) {
     interval_s_ = stamp_s - state_stamp_s_;
-    predict(interval_s_);
     state_stamp_s_ = stamp_s;
+    predict(interval_s_);
     frame->timings_ms.predict = stage.lap();
-    measure(image);
-    frame->timings_ms.measure = stage.lap();
-    if (options_.structure) observeStructure();
-    frame->timings_ms.structure = stage.lap();
-    match(image, frame.get());
-    frame->timings_ms.match = stage.lap();
-    correct(frame.get());
-    if (start_adjustment_.isActive()) adjustStart(frame.get());
-    frame->timings_ms.update = stage.lap();
-    judge();
-    maintainMap(image, frame.get());
-    frame->timings_ms.map = stage.lap();
-    if (options_.structure) updateStructure(frame.get());
-    frame->timings_ms.structure += stage.lap();
+    // Over a long gap the prediction says next to nothing: the whole image is asked first.
+    const bool is_gap = interval_s_ > options_.max_frame_interval_s;
+    if (!is_gap || !findInMap(image, frame.get())) follow(image, frame.get());
   }
   image.copyTo(previous_image_);  // the caller may use its memory again
   frame->state = state_;

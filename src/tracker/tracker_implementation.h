@@ -45,6 +45,7 @@ class Tracker::Implementation {
   void start(const cv::Mat& image, TrackedFrame* frame);
   bool startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame);
   void adjustStart(TrackedFrame* frame);
+  void follow(const cv::Mat& image, TrackedFrame* frame);
   void predict(double interval_s);
   void measure(const cv::Mat& image);
   void match(const cv::Mat& image, TrackedFrame* frame);
@@ -52,6 +53,7 @@ class Tracker::Implementation {
   void judge();
   void lose(const std::string& reason);
   void relocalise(const cv::Mat& image, TrackedFrame* frame);
+  bool findInMap(const cv::Mat& image, TrackedFrame* frame);
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure();
   void updateStructure(TrackedFrame* frame);

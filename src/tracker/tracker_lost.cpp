@@ -12,12 +12,6 @@ constexpr double kFoundSigmaRotation = 0.1;  ///< [rad]
 constexpr int kFramesBetweenLooks = 4;       ///< a look through the whole map takes long
 constexpr int kLeastMap = 10;                ///< a smaller map can't be found again
 
-bool isSameCamera(const CameraCalibration& a, const CameraCalibration& b) {
-  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
-         a.cx == b.cx && a.cy == b.cy && a.distortion_model == b.distortion_model &&
-         a.distortion == b.distortion;
-}
-
 }  // namespace
 
 /// Decides whether the camera is still tracked.
@@ -53,7 +47,7 @@ void Tracker::Implementation::lose(const std::string& reason) {
   filter_.relocateCamera(camera, filter_.cameraCovariance());
 }
 
-/// Looks for the camera in the whole map by one whole image.
+/// What becomes of an image while the camera is lost.
 void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
   if (map_.size() < kLeastMap) {
@@ -66,9 +60,14 @@ void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* fra
     reset(reason.str());
     return;
   }
-  if (frame->index % kFramesBetweenLooks != 0) return;
+  if (frame->index % kFramesBetweenLooks == 0) findInMap(image, frame);
+}
+
+/// Looks for the camera in the whole map by one whole image. False when it is not found; the state
+/// is then as before.
+bool Tracker::Implementation::findInMap(const cv::Mat& image, TrackedFrame* frame) {
   const auto found = relocaliser_.find(image, filter_, map_);
-  if (!found) return;
+  if (!found) return false;
   CameraState camera;
   camera.position_world = found->T_world_camera.translation();
   camera.q_world_camera = Eigen::Quaterniond(found->T_world_camera.linear()).normalized();
@@ -87,6 +86,9 @@ void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* fra
   frame->nis_degrees = 2 * report.used;
   state_ = TrackingState::kTracking;
   reason_.clear();
+  poor_frames_ = 0;
+  start_adjustment_.end();
+  return true;
 }
 
 void Tracker::Implementation::saveMap(const std::string& path) const {
@@ -109,7 +111,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   const auto refuse = [&](const std::string& why) {
     throw std::runtime_error("'" + path + "': " + why);
   };
-  if (!isSameCamera(content.camera, camera_.calibration()))
+  if (!sameImaging(content.camera, camera_.calibration()))
     refuse("the map was made with another camera or calibration");
   if (content.template_size_px != options_.image.template_size_px ||
       content.source_patch_size_px != options_.image.source_patch_size_px)

@@ -10,11 +10,15 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "active_matching_slam/image/template.h"
 #include "active_matching_slam/matching/matcher.h"
 #include "active_matching_slam/tracker/option_fields.h"
 
 namespace active_matching_slam {
 namespace {
+
+constexpr std::size_t kFewestKnownPoints = 4;
+constexpr int kSmallestTemplate = 5;  ///< side [px], as of image/template_size_px
 
 /// Throws for every number outside its closed range (NaN included).
 struct RangeCheck {
@@ -113,9 +117,10 @@ void checkTrackerOptions(const TrackerOptions& options) {
   checkImageOptions(options.image);
   checkMapOptions(options.map);
   checkMatchOptions(options.matching);
-  if (!options.known_points.empty() && options.known_points.size() < 4)
+  if (!options.known_points.empty() && options.known_points.size() < kFewestKnownPoints)
     throw std::invalid_argument("known points: " + std::to_string(options.known_points.size()) +
-                                " given, a start needs at least 4");
+                                " given, a start needs at least " +
+                                std::to_string(kFewestKnownPoints));
 }
 
 std::vector<KnownPoint> readKnownPointsYaml(const std::string& path) {
@@ -147,9 +152,19 @@ std::vector<KnownPoint> readKnownPointsYaml(const std::string& path) {
       const std::string file = (folder / node["template"].as<std::string>()).string();
       point.template_image = cv::imread(file, cv::IMREAD_GRAYSCALE);
       if (point.template_image.empty()) fail(where + ".template: can't read image '" + file + "'");
+      const auto patch = makeTemplate(point.template_image);
+      if (!patch || patch->size < kSmallestTemplate)
+        fail(where + ".template: '" + file + "' is " + std::to_string(point.template_image.cols) +
+             " x " + std::to_string(point.template_image.rows) +
+             " pixels; it must be square, of an odd side from " +
+             std::to_string(kSmallestTemplate) + " to " + std::to_string(Template::kMaximumSize));
+      if (patch->energy == 0) fail(where + ".template: '" + file + "' shows nothing but one grey");
     }
     points.push_back(point);
   }
+  if (points.size() < kFewestKnownPoints)
+    fail("points has " + std::to_string(points.size()) + " entries, a start needs at least " +
+         std::to_string(kFewestKnownPoints));
   return points;
 }
 

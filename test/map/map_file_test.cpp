@@ -1,14 +1,19 @@
 #include "active_matching_slam/map/map_file.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <boost/crc.hpp>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <random>
 #include <stdexcept>
+
+#include "support/fuzz.h"
 
 namespace active_matching_slam {
 namespace {
@@ -45,6 +50,7 @@ MapFileContent smallMap() {
     feature.id = state.id;
     feature.attempts = 7;
     feature.successes = 5;
+    feature.rates = {40 + state.id, 3, 2, 100000};
     feature.first_frame = 3;
     feature.patch.image.create(15, 15, CV_8UC1);
     for (int i = 0; i < 15 * 15; ++i)
@@ -109,6 +115,8 @@ TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
     EXPECT_EQ(read.features[i].bearing_world, written.features[i].bearing_world);
     EXPECT_EQ(cv::norm(read.map[i].patch.image, written.map[i].patch.image, cv::NORM_INF), 0.0);
     EXPECT_EQ(read.map[i].successes, 5);
+    EXPECT_EQ(read.map[i].rates.successes, 41 + i);
+    EXPECT_EQ(read.map[i].rates.pixels, 100000);
   }
   EXPECT_EQ(serializeMap(read), serializeMap(written));
 }
@@ -151,6 +159,25 @@ TEST_F(MapFile, AFaultyStateIsNotWrittenAndTheOldFileStays) {
   faulty.covariance(3, 3) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(writeMapFile(path_, faulty), std::runtime_error);
   EXPECT_EQ(readMapFile(path_).map.size(), 3u);
+}
+
+// The writer is killed again and again, wherever it happens to be: the file is always a whole map.
+TEST_F(MapFile, AWriterKilledAtAnyMomentLeavesAWholeMap) {
+  writeMapFile(path_, smallMap());
+  const std::string bytes = serializeMap(smallMap());
+  std::mt19937 random(1);
+  for (int run = 0; run < 60; ++run) {
+    const pid_t writer = ::fork();
+    ASSERT_GE(writer, 0);
+    if (writer == 0)
+      for (;;) writeMapFile(path_, smallMap());
+    ::usleep(random() % 10000);
+    ::kill(writer, SIGKILL);
+    ::waitpid(writer, nullptr, 0);
+    EXPECT_EQ(serializeMap(readMapFile(path_)), bytes) << "run " << run;
+  }
+  for (const auto& left : std::filesystem::directory_iterator(folder_))
+    if (left.path() != path_) std::filesystem::remove(left.path());  // what the dead had begun
 }
 
 TEST_F(MapFile, RefusesEveryTruncation) {
@@ -201,7 +228,7 @@ TEST_F(MapFile, MutatedFilesAreRefusedOrSound) {
                                         0x7ff0000000000000,
                                         0x7fefffffffffffff};
   int accepted = 0;
-  for (int run = 0; run < 30000; ++run) {
+  for (int run = 0; run < fuzzInputs(30000); ++run) {
     std::string bytes = original;
     for (int change = 0; change <= static_cast<int>(random() % 3); ++change) {
       const std::size_t at = 24 + random() % (bytes.size() - 40);

@@ -8,6 +8,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "support/fuzz.h"
+
 namespace active_matching_slam {
 namespace {
 
@@ -190,7 +192,7 @@ TEST(CameraInfo, NoNumbersWhateverDoMoreThanBeRefused) {
   const std::vector<std::uint32_t> sizes = {0u, 1u, 2u, 479u, 480u, 640u, 0x7fffffffu, 0xffffffffu};
   const std::vector<std::string> models = {"plumb_bob", "equidistant", "rational_polynomial", "x"};
   int accepted = 0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < fuzzInputs(20000); ++i) {
     sensor_msgs::CameraInfo info = makeInfo();
     for (int change = generator() % 4; change >= 0; --change) switch (generator() % 7) {
         case 0:
@@ -230,7 +232,7 @@ TEST(ImageConversions, NoMutilationOfAnImageDoesMoreThanBeRefused) {
                                           "bayer_rggb8", "16UC1", "32FC1", "bayer_gbrg16",
                                           "yuv422",      "8UC7",  "",      "64FC4"};
   int accepted = 0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < fuzzInputs(20000); ++i) {
     sensor_msgs::Image image = makeImage("mono8", shadedImage());
     image.encoding = names[generator() % names.size()];
     if (generator() % 2) image.width = generator() % 70;

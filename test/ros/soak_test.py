@@ -13,6 +13,7 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
+from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
 from active_matching_slam.msg import MatchingStatistics, TrackingState
@@ -107,6 +108,27 @@ class SoakTest(unittest.TestCase):
         self.assertIsNotNone(last, 'the newest image is always tracked')
         self.assertGreater(last.dropped_images, before)
         self.assertLess(len(inbox.messages), 200)
+
+    def test_latency_stays_within_two_frames_of_the_tracker(self):
+        """However fast the source: when an image comes, one frame is in work, and then it is its turn."""
+        inbox = harness.Inbox('/tracker/statistics', MatchingStatistics)
+        harness.wait_until(inbox.connected, what='statistics')
+        source = rospy.Publisher(harness.IMAGE_TOPIC, Image, queue_size=1)
+        harness.wait_until(lambda: source.get_num_connections() > 0, what='connection')
+        answered_before = {}
+        for _ in range(1000):
+            image = self.next_image()
+            answered_before[image.header.stamp] = len(inbox.messages)
+            source.publish(image)
+            threading.Event().wait(0.002)
+        rospy.sleep(1.0)
+        frames = [number + 1 - answered_before[message.header.stamp]
+                  for number, message in enumerate(inbox.messages)]
+        self.assertGreater(len(frames), 20)
+        self.assertLess(len(frames), 1000, 'the source must be the faster one')
+        within = sum(count <= 2 for count in frames)
+        self.assertGreater(within, 0.9 * len(frames), sorted(frames)[-20:])
+        self.assertLessEqual(max(frames), 4)
 
 
 if __name__ == '__main__':

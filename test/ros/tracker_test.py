@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
-"""The tracker in a ROS graph, as node and as nodelet: pose, tf, covariances, stamps, odd input.
+"""The tracker in a ROS graph, as node and as nodelet: pose, tf, covariances, stamps, services.
 
 Parameters: ~bag (simulated, with truth), ~tracker (name of the node under test).
 """
 
-import copy
 import math
 import os
 import sys
@@ -251,78 +250,6 @@ class TrackerTest(unittest.TestCase):
         self.assertEqual(TrackingState.LOST, blind.state)
         self.assertIsNone(inbox.wait_for_stamp(blind.header.stamp, 1.0))
         self.assertIsNone(transforms.wait_for_stamp(blind.header.stamp, 0.0))
-
-    # -- odd input -----------------------------------------------------------------------------
-
-    def test_an_uncalibrated_camera_waits_and_a_calibrated_one_starts(self):
-        self.addCleanup(self.feeder.calibrate, self.recording.info)
-        inbox = self.inbox('pose', PoseWithCovarianceStamped)
-        bad = copy.deepcopy(self.recording.info)
-        bad.K = [0.0] * 9
-        self.assertIsNone(self.feeder.feed(self.image(0), bad, expect_answer=False, timeout_s=0.5))
-        for broken in ([float('nan')] * 9, [-1.0] + list(self.recording.info.K[1:])):
-            bad.K = broken
-            self.assertIsNone(
-                self.feeder.feed(self.image(1), bad, expect_answer=False, timeout_s=0.5))
-        self.assertEqual([], inbox.messages)
-        state = self.feeder.feed(self.image(2), self.recording.info)
-        self.assertEqual(TrackingState.TRACKING, state.state)
-
-    def test_a_changed_calibration_starts_anew(self):
-        self.addCleanup(self.feeder.calibrate, self.recording.info)
-        inbox = self.inbox('path', Path)
-        self.run_images(0, 5)
-        changed = copy.deepcopy(self.recording.info)
-        changed.K = [1.01 * k for k in changed.K[:8]] + [1.0]
-        self.feeder.feed(self.image(5), changed)
-        path = inbox.wait_for_stamp(self.image(5).header.stamp)
-        self.assertEqual(1, len(path.poses))
-
-    def test_images_of_another_size_are_left_out(self):
-        self.run_images(0, 5)
-        small = harness.pixels_of(self.images[5])[::2, ::2]
-        state = self.feeder.feed(self.image(5, small))
-        self.assertIn('%d x %d' % (small.shape[1], small.shape[0]), state.reason)
-        states = self.run_images(6, 10)
-        self.assertTrue(all(s.state == TrackingState.TRACKING for s in states))
-        self.assertEqual('', states[-1].reason)
-
-    def test_malformed_images_are_left_out(self):
-        self.run_images(0, 3)
-        for spoil in ({'data': b'123'}, {'encoding': 'sepia'}, {'step': 1}, {'width': 0},
-                      {'height': 4000000000}, {'header': rospy.Header()}):
-            image = copy.copy(self.image(3))
-            for field, value in spoil.items():
-                setattr(image, field, value)
-            self.feeder.feed(image, expect_answer=False, timeout_s=0.1)
-        self.assertEqual(TrackingState.TRACKING, self.run_images(4, 8)[-1].state)
-
-    def test_every_usual_encoding_is_tracked(self):
-        gray = harness.pixels_of(self.images[0]).astype(np.uint8)
-        deep = gray.astype(np.uint16) * 257
-        color = np.repeat(gray[:, :, None], 3, axis=2)
-        for index, (encoding, pixels) in enumerate(
-                [('mono8', gray), ('bgr8', color), ('rgb8', color), ('mono16', deep),
-                 ('bayer_rggb8', gray)]):
-            self.service('reset', Trigger)()
-            image = self.image(index)
-            image.encoding = encoding
-            image.is_bigendian = 0
-            image.step = pixels.strides[0]
-            image.data = pixels.tobytes()
-            state = self.feeder.feed(image)
-            self.assertEqual(TrackingState.TRACKING, state.state, encoding)
-
-    def test_a_repeated_stamp_adds_nothing(self):
-        inbox = self.inbox('pose', PoseWithCovarianceStamped)
-        self.run_images(0, 3)
-        self.assertIsNotNone(inbox.wait_for_stamp(self.image(2).header.stamp))
-        state = self.feeder.feed(self.image(2))
-        self.assertIn('stamp', state.reason)
-        self.run_images(3, 4)
-        self.assertIsNotNone(inbox.wait_for_stamp(self.image(3).header.stamp))
-        stamps = [m.header.stamp for m in inbox.messages]
-        self.assertEqual(len(set(stamps)), len(stamps))
 
     # -- services and run-time changes ---------------------------------------------------------
 

@@ -322,9 +322,40 @@ TEST(KnownPoints, FaultsAreNamed) {
     expectNames(message, path);
     expectNames(message, fault.named);
   }
-  for (const std::string text : {"corners: []\n", "points: 3\n", "- 1\n", "points: [{\n"}) {
+  for (const std::string text :
+       {"corners: []\n", "points: 3\n", "- 1\n", "points: [{\n", "points: []\n",
+        "points: [{position_m: [0, 0, 0], image_px: [10, 20]}]\n"}) {
     const std::string path = writeFile("fault.yaml", text);
     expectNames(messageOf<std::runtime_error>([&] { readKnownPointsYaml(path); }), path);
+  }
+}
+
+TEST(KnownPoints, AnEmptyListIsAFaultAndNotAFreeScale) {
+  const std::string path = writeFile("empty.yaml", "points: []\n");
+  const std::string message = messageOf<std::runtime_error>([&] { readKnownPointsYaml(path); });
+  expectNames(message, "0 entries");
+  expectNames(message, "at least 4");
+}
+
+TEST(KnownPoints, TemplatesThatCanNotBeMatchedAreRefusedWithTheirSize) {
+  cv::Mat noise(64, 64, CV_8UC1);
+  cv::randu(noise, 0, 256);
+  const struct {
+    cv::Mat image;
+    const char* named;
+  } cases[] = {{noise(cv::Rect(0, 0, 10, 10)), "10 x 10"},
+               {noise(cv::Rect(0, 0, 11, 13)), "11 x 13"},
+               {noise(cv::Rect(0, 0, 3, 3)), "3 x 3"},
+               {noise(cv::Rect(0, 0, 33, 33)), "33 x 33"},
+               {cv::Mat(11, 11, CV_8UC1, cv::Scalar(80)), "one grey"}};
+  for (const auto& fault : cases) {
+    cv::imwrite(testing::TempDir() + "/odd_template.png", fault.image);
+    const std::string path = writeFile(
+        "odd.yaml",
+        knownPointsText("{position_m: [0, 1, 0], image_px: [10, 80], template: odd_template.png}"));
+    const std::string message = messageOf<std::runtime_error>([&] { readKnownPointsYaml(path); });
+    expectNames(message, "points[3].template");
+    expectNames(message, fault.named);
   }
 }
 

@@ -25,6 +25,9 @@ struct CameraCalibration {
 /// A zero focal length is named as what it means in camera_info: an uncalibrated camera.
 void checkCalibration(const CameraCalibration& calibration);
 
+/// True when both take the same pictures: all but their names agree.
+bool sameImaging(const CameraCalibration& a, const CameraCalibration& b);
+
 /// Name used in camera_info ("plumb_bob", ...; "" and "none" mean no distortion). Throws
 /// std::invalid_argument for a model that is not supported, naming it.
 DistortionModel distortionModelFromName(const std::string& name);

@@ -27,6 +27,8 @@ class NodeDiagnostics {
   /// Begins to report. `images` is called at each report, from the thread that serves the node's
   /// callbacks.
   void start(std::function<Images()> images);
+  /// No more reports; one in work is waited for.
+  void stop() { timer_.stop(); }
 
   /// `latency_s`: from the image's stamp, by ROS time; `turnaround_s`: from its arrival to the last
   /// message published, by real time.

@@ -11,8 +11,9 @@
 namespace active_matching_slam {
 
 /// A Tracker fed with messages: makes it when the calibration is known, makes a new one when that
-/// changes, and answers everything odd that may arrive with a message instead of an exception. One
-/// thread at a time.
+/// changes, and answers everything odd that may arrive with a message instead of an exception.
+/// While a calibration is unusable no image is tracked, but the map waits for the old one to come
+/// back. One thread at a time.
 class TrackingSession {
  public:
   /// Throws std::invalid_argument, see checkTrackerOptions().
@@ -40,6 +41,7 @@ class TrackingSession {
 
  private:
   bool updateCamera(const CameraImage& image);
+  void takeCalibration(const CameraCalibration& calibration);
   TrackerOptions demandedOptions() const;
 
   TrackerOptions options_;

@@ -32,7 +32,9 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.structure);
   visit(F{"known_points_search_px", "how far a known point may lie from its image_px [px]", false},
         o.known_points_search_px, 1.0, 200.0);
-  visit(F{"max_frame_interval_s", "motion is predicted over at most so long a gap between stamps [s]", true},
+  visit(F{"max_frame_interval_s",
+          "after a longer gap between stamps the whole image is searched for the map first [s]",
+          true},
         o.max_frame_interval_s, 0.01, 3600.0);
   visit(
       F{"lost_after_frames", "frames with too few matches in a row until the camera is lost", true},

@@ -38,7 +38,7 @@ struct TrackerOptions {
   MatchOptions matching = liveMatchOptions();
   std::vector<KnownPoint> known_points;  ///< empty: scale free, world = first camera frame
   double known_points_search_px = 15.0;  ///< how far each may lie from its image_px
-  double max_frame_interval_s = 2.0;     ///< motion is predicted over at most so long a gap
+  double max_frame_interval_s = 0.5;     ///< after a longer gap the whole image is asked first
   int lost_after_frames = 15;            ///< consecutive frames with too few matches
   int minimum_matches = 4;               ///< fewer is 'too few'
   double reset_when_lost_after_s = 0.0;  ///< 0: never reset, keep looking for the map

@@ -1,0 +1,297 @@
+#!/usr/bin/env python3
+"""Runs every command of the README and doc/: what stands there works as it stands there.
+
+A command is a line of an indented block, or text in backquotes, that begins with one of PROGRAMS.
+Each has a recipe below that says how it is run here; a command without one fails the test. Recipes
+run against a camera (a recording over and over), a tracker, and a master of their own.
+
+AMS_PROGRAMS: where the built programs are. AMS_TEST_BAG: the recording. AMS_BUILT: the build folder.
+"""
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parents[2]
+PACKAGE = 'active_matching_slam'
+BAG = os.environ['AMS_TEST_BAG']
+BUILT = os.environ['AMS_BUILT']
+PROGRAMS = ('scripts/', 'roslaunch ', 'rosrun ', 'rosservice ', 'rostopic ', 'rosbag ', 'rosnode ',
+            'track_bag ', 'export ', 'ping ', 'ntpdate ')
+PATIENCE_S = 120
+
+
+def commands():
+    """(document, command) of all documents, without comments, in order."""
+    found = []
+    for document in [SOURCE / 'README.md'] + sorted((SOURCE / 'doc').glob('*.md')):
+        text = document.read_text(encoding='utf-8').replace('\\\n', ' ')
+        blocks = re.findall(r'^    (.*)$', text, re.M)
+        inline = re.findall(r'`([^`\n]+)`', text)
+        for line in blocks + inline:
+            line = re.sub(r'\s+#.*', '', line).strip()
+            if line.startswith(PROGRAMS) and ' ' in line or line.startswith('scripts/'):
+                found.append((document.name, re.sub(r'\s+', ' ', line)))
+    return found
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(('127.0.0.1', 0))
+        return s.getsockname()[1]
+
+
+class Shell:
+    """A folder with what the documents assume to be there, and an environment to run in."""
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        self.started = []
+        self.log = open(str(self.folder / 'log.txt'), 'w+')
+        self.environment = dict(os.environ, ROS_HOME=str(self.folder / 'ros_home'),
+                                PYTHONUNBUFFERED='1',
+                                PATH=os.environ['AMS_PROGRAMS'] + ':' + os.environ['PATH'],
+                                PYTHONPATH='%s:%s' % (SOURCE / 'test' / 'ros',
+                                                      os.environ.get('PYTHONPATH', '')))
+        for name in ('ROS_IP', 'ROS_HOSTNAME'):
+            self.environment.pop(name, None)
+        shutil.copy(BAG, str(self.folder / 'desk.bag'))
+        stem = BAG[:-len('.bag')]
+        shutil.copy(stem + '.camera.yaml', str(self.folder / 'camera.yaml'))
+        (self.folder / 'mine.yaml').write_text('filter: {sigma_px: 1.0}\n')
+
+    def start(self, command):
+        process = subprocess.Popen(['bash', '-c', 'exec ' + command], cwd=str(self.folder),
+                                   env=self.environment, stdin=subprocess.DEVNULL, stdout=self.log,
+                                   stderr=subprocess.STDOUT, start_new_session=True)
+        self.started.append(process)
+        return process
+
+    def stop(self, process):
+        for number, patience in ((signal.SIGINT, 30), (signal.SIGKILL, 10)):
+            if process.poll() is None:
+                os.killpg(process.pid, number)
+            try:
+                process.wait(patience)
+                break
+            except subprocess.TimeoutExpired:
+                pass
+        self.started.remove(process)
+
+    def close(self):
+        for process in reversed(list(self.started)):
+            self.stop(process)
+        self.log.close()
+
+    def run(self, command, check=True):
+        """Its output; what it says on the way to a fault is in the failure's text."""
+        done = subprocess.run(['bash', '-c', command], cwd=str(self.folder), env=self.environment,
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, timeout=PATIENCE_S + 60,
+                              universal_newlines=True)
+        if check and done.returncode != 0:
+            raise AssertionError('%s: status %d\n%s' % (command, done.returncode, done.stdout))
+        return done.stdout
+
+    # A graph of its own ---------------------------------------------------------------------
+
+    def new_master(self):
+        self.environment['ROS_MASTER_URI'] = 'http://localhost:%d' % free_port()
+
+    def start_master(self):
+        self.new_master()
+        self.start('roscore -p ' + self.environment['ROS_MASTER_URI'].rsplit(':', 1)[1])
+        self.wait_for('rostopic list')
+
+    def wait_for(self, command):
+        """Until it succeeds."""
+        end = time.time() + PATIENCE_S
+        while subprocess.run(['bash', '-c', 'timeout 20 ' + command], cwd=str(self.folder),
+                             env=self.environment, stdin=subprocess.DEVNULL,
+                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode:
+            if time.time() > end:
+                self.log.flush()
+                raise AssertionError('never succeeded: %s\n%s' % (
+                    command, Path(self.log.name).read_text(errors='replace')[-3000:]))
+            time.sleep(0.3)
+
+    def wait_until_tracking(self):
+        self.wait_for("rostopic echo -n 1 --filter 'm.state == 2' /tracker/state | grep -q state")
+
+    def start_camera(self, topics=''):
+        self.start('rosbag play --quiet --loop --rate 0.5 desk.bag %s </dev/null' % topics)
+
+
+class CommandsTest(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix='ams_commands_')
+        cls.shell = Shell(cls.folder)
+        cls.ran = set()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.shell.close()
+        shutil.rmtree(cls.folder)
+
+    def run_documented(self, pattern, recipe):
+        """Applies `recipe(command)` to every documented command that the pattern matches."""
+        matching = [c for c in dict.fromkeys(c for _, c in commands()) if re.fullmatch(pattern, c)]
+        self.assertTrue(matching, 'no document has: ' + pattern)
+        for command in matching:
+            with self.subTest(command=command):
+                recipe(command)
+
+    # -- offline -------------------------------------------------------------------------------
+
+    def test_tracking_of_a_bag(self):
+        def track(command):
+            shutil.rmtree(self.folder + '/desk', ignore_errors=True)
+            output = self.shell.run(command)
+            folder = re.search(r'--output (\S+)', command).group(1)
+            for name in ('trajectory.txt', 'statistics.csv', 'summary.json'):
+                self.assertTrue((Path(self.folder) / folder / name).is_file(), output)
+        self.run_documented(TRACK_BAG, track)
+
+    def test_images_and_a_video_become_a_bag(self):
+        self.shell.run('mkdir -p frames && python3 - <<"END"\n' + MAKE_FRAMES + 'END\n')
+
+        def convert(command):
+            os.rename(self.folder + '/desk.bag', self.folder + '/kept.bag')
+            try:
+                self.shell.run(command.replace('scripts/', '%s/scripts/' % SOURCE))
+                info = self.shell.run('rosbag info desk.bag')
+                self.assertIn('/camera/image_raw', info)
+                self.assertIn('/camera/camera_info', info)
+            finally:
+                os.replace(self.folder + '/kept.bag', self.folder + '/desk.bag')
+        self.run_documented(IMAGES_TO_BAG, convert)
+
+    def test_help_of_every_tool(self):
+        def ask(command):
+            for tool in sorted((SOURCE / 'src' / 'tools').glob('*.cpp')):
+                self.assertTrue(self.shell.run(command.replace('TOOL', tool.stem)).strip())
+        self.run_documented(TOOL_HELP, ask)
+
+    def test_demo(self):
+        def show(command):
+            bag = '' if command.endswith('.bag') else 'desk.bag'
+            output = self.shell.run('%s/%s %s --headless --built %s --output demo' %
+                                    (SOURCE, command.replace('BAG', ''), bag, BUILT))
+            self.assertIn('demo/trajectory.png', output)
+            self.assertIn('demo/rviz.png', output)
+        if not shutil.which('rviz') or not shutil.which('Xvfb'):
+            self.skipTest('skipped: rviz and Xvfb are not installed')
+        self.run_documented(DEMO, show)
+
+    # -- against a running tracker ---------------------------------------------------------------
+
+    def test_commands_beside_a_running_tracker(self):
+        self.shell.start_master()
+        self.shell.start('rosrun %s %s_node __name:=tracker image:=/camera/image_raw' %
+                         (PACKAGE, PACKAGE))
+        self.shell.start_camera()
+        self.shell.wait_until_tracking()
+        self.addCleanup(lambda: [self.shell.stop(p) for p in list(self.shell.started)])
+
+        def watch(command):  # those that go on until Ctrl-C
+            if command.endswith('/compressed'):
+                return  # in machines_test.py, where there is such a camera
+            self.assertIn('average rate', self.shell.run(
+                'timeout %d %s | grep -m 1 "average rate"' % (PATIENCE_S, command)))
+        self.run_documented(r'rostopic hz .*', watch)
+
+        def ask(command):
+            self.assertIn('---', self.shell.run('timeout 30 ' + command))
+        self.run_documented(r'rostopic echo -n 1 .*', ask)
+        self.run_documented(r'rosservice call .*', lambda command: self.assertIn(
+            'success: True', self.shell.run(command)))
+        self.run_documented(r'rosnode ping .*', lambda command: self.assertIn(
+            'ping average', self.shell.run(command)))
+        self.run_documented(r'rosrun dynamic_reconfigure .*', self.shell.run)
+
+        def record(command):
+            os.rename(self.folder + '/desk.bag', self.folder + '/kept.bag')
+            try:
+                recorder = self.shell.start(command)
+                self.shell.wait_for('test "$(stat -c %s desk.bag.active)" -gt 500000')
+                self.shell.stop(recorder)
+                self.assertIn('/camera/image_raw', self.shell.run('rosbag info desk.bag'))
+            finally:
+                os.replace(self.folder + '/kept.bag', self.folder + '/desk.bag')
+        self.run_documented(r'rosbag record .*', record)
+
+    # -- launch files ----------------------------------------------------------------------------
+
+    def test_launch_files(self):
+        def launch(command):
+            self.shell.new_master()
+            port = self.shell.environment['ROS_MASTER_URI'].rsplit(':', 1)[1]
+            if 'rviz:=' in command or 'play_bag' in command:  # a window: see test_demo
+                command = re.sub(r' rviz:=\w+', '', command) + ' rviz:=false'
+            self.shell.start(command.replace('roslaunch', 'roslaunch -p ' + port))
+            self.shell.wait_for('rosparam get /run_id')
+            if 'manager:=' in command:
+                self.shell.start('rosrun nodelet nodelet manager __ns:=/camera __name:=manager')
+            if 'compressed' in command:
+                self.shell.run('python3 -c "import harness; harness.compress_bag(\'desk.bag\', '
+                               '\'compressed.bag\', 60)"')
+                self.shell.start('rosbag play --quiet --loop --rate 0.5 compressed.bag </dev/null')
+            elif 'tracker.launch' in command:
+                self.shell.start_camera()
+            self.shell.wait_until_tracking()
+            for process in reversed(list(self.shell.started)):
+                self.shell.stop(process)
+        self.run_documented(LAUNCH, launch)
+
+    # -- none is left out ------------------------------------------------------------------------
+
+    def test_every_command_has_a_recipe(self):
+        for document, command in commands():
+            self.assertTrue(any(re.fullmatch(pattern, command) for pattern in RECIPES),
+                            '%s: nothing runs: %s' % (document, command))
+
+
+TRACK_BAG = r'(rosrun %s )?track_bag .*' % PACKAGE
+IMAGES_TO_BAG = r'scripts/images_to_bag .+'
+TOOL_HELP = r'rosrun %s TOOL --help' % PACKAGE
+DEMO = r'scripts/demo( BAG| desk\.bag)'
+LAUNCH = r'roslaunch .*'
+RECIPES = [
+    TRACK_BAG, IMAGES_TO_BAG, TOOL_HELP, DEMO, LAUNCH, r'rostopic hz .*', r'rostopic echo -n 1 .*',
+    r'rosservice call .*', r'rosnode ping .*', r'rosrun dynamic_reconfigure .*', r'rosbag record .*',
+    # Run by whoever runs this test, or part of what runs above.
+    r'scripts/(build|test|demo|images_to_bag)( && source build/devel/setup\.bash)?',
+    r'rosbag play --clock', r'rostopic (list|echo)',
+    # Run in machines_test.py.
+    r'export ROS_.*', r'ping .*',
+    # For people with a board in the hand, another computer, or a screen.
+    r'rosrun camera_calibration .*', r'ntpdate -q .*', r'rosrun image_view .*']
+
+MAKE_FRAMES = '''
+import harness
+with open('times.txt', 'w') as times, open('phone.mp4', 'wb') as video:
+    recording = harness.Recording('desk.bag')
+    # Uncompressed video: what tells is the content, not the name.
+    width, height = recording.info.width, recording.info.height
+    video.write(b'YUV4MPEG2 W%d H%d F30:1 Ip C420jpeg\\n' % (width, height))
+    for i, image in enumerate(recording.images[:20]):
+        pixels = harness.pixels_of(image).astype('uint8')
+        with open('frames/%06d.png' % i, 'wb') as frame:
+            frame.write(harness.png(pixels))
+        stamp = image.header.stamp
+        times.write('%d.%09d %06d.png\\n' % (stamp.secs, stamp.nsecs, i))
+        video.write(b'FRAME\\n' + pixels.tobytes() + bytes([128]) * (width * height // 2))
+'''
+
+if __name__ == '__main__':
+    unittest.main(argv=sys.argv, verbosity=2)

@@ -1,0 +1,201 @@
+// A camera that is carried off and put down elsewhere: lost, and found again in the same map.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "tracker/simulated_frames.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr int kCarriedOff = 90;  ///< frame of the film before which the camera is taken away
+constexpr int kElsewhere = 40;   ///< frames in between
+
+/// Frames of another place, with the stamps that follow frame kCarriedOff - 1 of the film.
+const Film& elsewhere() {
+  static const Film film = [] {
+    SimulatorOptions options;
+    options.scene = "office";
+    options.seed = 5;
+    options.duration_s = 2.0;
+    Film other = makeFilm(options);
+    for (std::size_t i = 0; i < other.frames.size(); ++i)
+      other.frames[i].stamp_s = slowFilm().frames[kCarriedOff - 1].stamp_s + double(i + 1) / 30.0;
+    return other;
+  }();
+  return film;
+}
+
+/// The slow film with its second part put off by the time elsewhere.
+Film putOff(Film film, double by_s) {
+  for (std::size_t i = kCarriedOff; i < film.frames.size(); ++i) film.frames[i].stamp_s += by_s;
+  return film;
+}
+
+std::set<FeatureId> idsOf(const TrackedFrame& frame) {
+  std::set<FeatureId> ids;
+  for (const TrackedFeature& feature : frame.features) ids.insert(feature.id);
+  return ids;
+}
+
+double sigmaPosition(const TrackedFrame& frame) {
+  return std::sqrt(frame.camera_covariance.topLeftCorner<3, 3>().trace());
+}
+
+/// First frame that is tracked again; the number of frames when there is none.
+int firstTracked(const Frames& frames) {
+  const auto it = std::find_if(frames.begin(), frames.end(), [](const auto& frame) {
+    return frame->state == TrackingState::kTracking;
+  });
+  return static_cast<int>(it - frames.begin());
+}
+
+/// The scale and the frame of the world are those of before: one similarity fits both parts.
+void expectOnePath(const Film& film, Frames before, const Frames& after, int first_after) {
+  Film joined{film.camera, {}};
+  joined.frames.assign(film.frames.begin(), film.frames.begin() + std::ptrdiff_t(before.size()));
+  joined.frames.insert(joined.frames.end(), film.frames.begin() + first_after, film.frames.end());
+  before.insert(before.end(), after.begin(), after.end());
+  const PathFit fit = fitPath(joined, before);
+  EXPECT_LT(fit.rms_m, 0.1 * fit.path_m);
+}
+
+TEST(Kidnapping, TheCameraIsLostElsewhereAndFoundAtHomeInTheSameMap) {
+  const Film film = putOff(slowFilm(), kElsewhere / 30.0);
+  Tracker tracker(film.camera, {});
+  const Frames before = trackFrames(film, &tracker, 0, kCarriedOff);
+  const auto known = idsOf(*before.back());
+
+  const Frames away = trackFrames(elsewhere(), &tracker, 0, kElsewhere);
+  const int allowed = tracker.options().lost_after_frames;
+  for (int i = allowed; i < kElsewhere; ++i) {
+    EXPECT_EQ(away[i]->state, TrackingState::kLost) << "frame " << i << " elsewhere";
+    EXPECT_NE(away[i]->reason, "");
+    EXPECT_TRUE(isFinite(*away[i]));
+    if (i > allowed) {
+      EXPECT_GT(sigmaPosition(*away[i]), sigmaPosition(*away[i - 1])) << "frame " << i;
+    }
+  }
+  EXPECT_EQ(away.back()->times_lost, 1);
+
+  const Frames after = trackFrames(film, &tracker, kCarriedOff, 180);
+  const int found = firstTracked(after);
+  ASSERT_LT(found, 15);
+  for (std::size_t i = found; i < after.size(); ++i) {
+    EXPECT_EQ(after[i]->state, TrackingState::kTracking) << "frame " << i << " at home";
+    EXPECT_TRUE(isFinite(*after[i]));
+  }
+  EXPECT_EQ(after.back()->resets, 0);
+  std::vector<FeatureId> kept;
+  const auto known_now = idsOf(*after[found]);
+  std::set_intersection(known.begin(), known.end(), known_now.begin(), known_now.end(),
+                        std::back_inserter(kept));
+  EXPECT_GT(2 * kept.size(), known.size()) << "the map is the one of before";
+  expectOnePath(film, before, Frames(after.begin() + found, after.end()), kCarriedOff + found);
+}
+
+TEST(Kidnapping, ACutToAnotherPartOfTheFilmIsFollowed) {
+  // From the end of the film back to its beginning, and the stamps go on.
+  Film film = slowFilm();
+  const double end_s = film.frames.back().stamp_s;
+  std::vector<SimulatedFrame> again(film.frames.begin(), film.frames.begin() + 120);
+  for (SimulatedFrame& frame : again) frame.stamp_s += end_s;
+  film.frames.insert(film.frames.end(), again.begin(), again.end());
+  Tracker tracker(film.camera, {});
+  const Frames before = trackFrames(film, &tracker, 0, 180);
+  const Frames after = trackFrames(film, &tracker, 180, 300);
+  for (const auto& frame : after) EXPECT_TRUE(isFinite(*frame));
+  EXPECT_EQ(after.back()->state, TrackingState::kTracking);
+  EXPECT_EQ(after.back()->resets, 0);
+  expectOnePath(film, before, Frames(after.begin() + 60, after.end()), 240);
+}
+
+TEST(Kidnapping, APauseOfTheCameraIsBridged) {
+  for (const double pause_s : {0.5, 3.0, 600.0}) {
+    const Film film = putOff(slowFilm(), pause_s);
+    Tracker tracker(film.camera, {});
+    const Frames before = trackFrames(film, &tracker, 0, kCarriedOff);
+    const Frames after = trackFrames(film, &tracker, kCarriedOff, 180);
+    const int found = firstTracked(after);
+    ASSERT_LT(found, 10) << pause_s << " s";
+    EXPECT_EQ(after.back()->state, TrackingState::kTracking) << pause_s << " s";
+    EXPECT_EQ(after.back()->resets, 0) << pause_s << " s";
+    expectOnePath(film, before, Frames(after.begin() + found, after.end()), kCarriedOff + found);
+  }
+}
+
+TEST(Kidnapping, TheTrackerStartsAnewAfterTheTimeItIsGiven) {
+  TrackerOptions options;
+  options.reset_when_lost_after_s = 0.4;
+  const Film film = putOff(slowFilm(), kElsewhere / 30.0);
+  Tracker tracker(film.camera, options);
+  trackFrames(film, &tracker, 0, kCarriedOff);
+  const Frames away = trackFrames(elsewhere(), &tracker, 0, kElsewhere);
+  int resets_seen = 0;
+  for (std::size_t i = 1; i < away.size(); ++i) {
+    if (away[i]->resets == away[i - 1]->resets) continue;
+    ++resets_seen;
+    EXPECT_NE(away[i]->reason.find("started anew"), std::string::npos) << away[i]->reason;
+    EXPECT_NEAR(double(i), options.lost_after_frames + 0.4 * 30.0, 2.0);
+  }
+  EXPECT_EQ(resets_seen, 1);
+  EXPECT_EQ(away.back()->state, TrackingState::kTracking) << "in a map of the new place";
+}
+
+/// A map file that is removed at the end.
+class SavedMap : public testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = testing::TempDir() + "/kidnapping_test_" + std::to_string(::getpid()) + ".map";
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+  std::string path_;
+};
+
+TEST_F(SavedMap, ANewTrackerFindsTheCameraInIt) {
+  const Film& film = slowFilm();
+  Tracker first(film.camera, {}), second(film.camera, {});
+  const Frames before = trackFrames(film, &first, 0, kCarriedOff);
+  first.setScale(2.0);
+  first.saveMap(path_);
+  second.loadMap(path_);
+  const Frames after = trackFrames(film, &second, kCarriedOff, 180);
+  const int found = firstTracked(after);
+  ASSERT_LT(found, 10);
+  EXPECT_EQ(after.back()->state, TrackingState::kTracking);
+  EXPECT_EQ(after.back()->scale_source, ScaleSource::kService);
+  Frames scaled;
+  for (const auto& frame : before) {
+    auto copy = std::make_shared<TrackedFrame>(*frame);
+    copy->camera.position_world *= 2.0;
+    scaled.push_back(copy);
+  }
+  expectOnePath(film, scaled, Frames(after.begin() + found, after.end()), kCarriedOff + found);
+}
+
+TEST_F(SavedMap, OfAnotherCameraOrDamagedIsRefusedAndChangesNothing) {
+  const Film& film = slowFilm();
+  Tracker tracker(film.camera, {}), undisturbed(film.camera, {});
+  trackFrames(film, &undisturbed, 0, 30);
+  trackFrames(film, &tracker, 0, 30);
+  EXPECT_THROW(tracker.loadMap(path_), std::runtime_error) << "there is none";
+  tracker.saveMap(path_);
+  CameraCalibration other = film.camera.calibration();
+  other.fx += 1.0;
+  Tracker of_another_camera(CameraModel(other), TrackerOptions{});
+  EXPECT_THROW(of_another_camera.loadMap(path_), std::runtime_error);
+  std::filesystem::resize_file(path_, std::filesystem::file_size(path_) / 2);
+  EXPECT_THROW(tracker.loadMap(path_), std::runtime_error) << "truncated";
+  std::ofstream(path_) << "image_width: 640\n";
+  EXPECT_THROW(tracker.loadMap(path_), std::runtime_error) << "foreign";
+  const Frames a = trackFrames(film, &tracker, 30, 40), b = trackFrames(film, &undisturbed, 30, 40);
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(sameState(*a[i], *b[i])) << "frame " << i;
+}
+
+}  // namespace
+}  // namespace active_matching_slam
