@@ -15,17 +15,6 @@ add_test(NAME ${PROJECT_NAME}_documents
 set_tests_properties(${PROJECT_NAME}_documents PROPERTIES ENVIRONMENT
   AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
 
-# Those that start programs with a ROS master of their own.
-set(commands_tests CommandsTest.test_every_command_has_a_recipe CommandsTest.test_tracking_of_a_bag
-  CommandsTest.test_images_and_a_video_become_a_bag CommandsTest.test_help_of_every_tool
-  CommandsTest.test_commands_beside_a_running_tracker)
-foreach(name commands machines)
-  add_test(NAME ${PROJECT_NAME}_${name} COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE}
-    ${CMAKE_CURRENT_SOURCE_DIR}/test/documents/${name}_test.py ${${name}_tests})
-  set_tests_properties(${PROJECT_NAME}_${name} PROPERTIES RUN_SERIAL TRUE TIMEOUT 900 ENVIRONMENT
-    "AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION};AMS_TEST_BAG=${test_bag};AMS_BUILT=${CMAKE_BINARY_DIR}")
-endforeach()
-
 get_property(tests DIRECTORY PROPERTY TESTS)
 foreach(test ${tests})
   if(test MATCHES "_rostest_")
