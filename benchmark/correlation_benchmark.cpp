@@ -1,6 +1,7 @@
 // Cost of searching elliptical windows: the package's correlation of runs of pixels against
-// cv::matchTemplate on the ellipse's bounding box. `per_px` is the time per pixel of the ellipse in
-// both.
+// cv::matchTemplate on the ellipse's bounding box, and against the least that any search must do:
+// read its window of the image once (`readWindow`, in the cache and from memory). `per_px` is the
+// time per pixel of the ellipse in all.
 
 #include <benchmark/benchmark.h>
 
@@ -87,6 +88,28 @@ void matchTemplateOnBox(benchmark::State& state) {
   reportPerPixel(state, pixels);
 }
 
+/// Reads the window of an ellipse once: of one image, which stays in the cache, or of so many in
+/// turn that each comes from memory.
+void readWindow(benchmark::State& state, int images) {
+  const cv::Mat image = texturedImage();
+  std::vector<cv::Mat> copies;
+  for (int i = 0; i < images; ++i) copies.push_back(image.clone());
+  int pixels = 0, reach = 0;
+  const SearchEllipse ellipse = ellipseOf(static_cast<double>(state.range(0)));
+  forEachEllipseRun(ellipse, kBox, [&](const PixelRun& run) {
+    pixels += run.end_u - run.begin_u;
+    reach = std::max({reach, 320 - run.begin_u, run.end_u - 320, std::abs(run.v - 240)});
+  });
+  reach += kSize / 2 + 1;
+  const cv::Rect window(320 - reach, 240 - reach, 2 * reach + 1, 2 * reach + 1);
+  std::size_t next = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(cv::sum(copies[next](window)));
+    if (++next == copies.size()) next = 0;
+  }
+  reportPerPixel(state, pixels);
+}
+
 /// A whole search: ellipse, mask, scores, maxima, refined matches.
 void searchEllipse(benchmark::State& state) {
   const cv::Mat image = texturedImage();
@@ -146,6 +169,8 @@ BENCHMARK_CAPTURE(correlateRuns, best, Correlator::Kernel::kAutomatic)->Arg(1)->
 BENCHMARK_CAPTURE(correlateRuns, sse2, Correlator::Kernel::kSse2)->Arg(1)->Arg(3)->Arg(8);
 BENCHMARK_CAPTURE(correlateRuns, portable, Correlator::Kernel::kPortable)->Arg(1)->Arg(3)->Arg(8);
 BENCHMARK(matchTemplateOnBox)->Arg(1)->Arg(3)->Arg(8);
+BENCHMARK_CAPTURE(readWindow, cached, 1)->Arg(1)->Arg(3)->Arg(8);
+BENCHMARK_CAPTURE(readWindow, from_memory, 400)->Arg(1)->Arg(3)->Arg(8);
 BENCHMARK(searchEllipse)->Arg(1)->Arg(3)->Arg(8);
 BENCHMARK(warpPatch);
 BENCHMARK(refineMatch);

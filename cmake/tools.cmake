@@ -14,6 +14,9 @@ foreach(source ${tool_sources})
   target_link_libraries(${tool} ams_tools)
   set_target_properties(${tool} PROPERTIES
     RUNTIME_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+  if(tool STREQUAL "reproduce")
+    target_sources(${tool} PRIVATE $<TARGET_OBJECTS:ams_experiments>)
+  endif()
   install(TARGETS ${tool} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 endforeach()
 
@@ -24,7 +27,8 @@ if(CATKIN_ENABLE_TESTING)
   target_include_directories(test_tools PRIVATE src)
   target_include_directories(test_tools SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
   target_compile_definitions(test_tools PRIVATE TRACK_BAG="$<TARGET_FILE:track_bag>"
-    IMAGES_TO_BAG="$<TARGET_FILE:images_to_bag>" CHECK_VECTORS="$<TARGET_FILE:check_vectors>")
+    IMAGES_TO_BAG="$<TARGET_FILE:images_to_bag>" CHECK_VECTORS="$<TARGET_FILE:check_vectors>"
+    REPRODUCE="$<TARGET_FILE:reproduce>")
   target_link_libraries(test_tools ams_tools gtest_main)
-  add_dependencies(test_tools track_bag images_to_bag check_vectors)
+  add_dependencies(test_tools track_bag images_to_bag check_vectors reproduce)
 endif()

@@ -79,6 +79,8 @@ void Tracker::Implementation::describe(TrackedFrame* frame) const {
     frame->features.push_back(out);
   }
   if (frame->matching.match_of_feature.empty()) return;
+  frame->prior = prior_;
+  frame->templates = templates_;
   std::size_t next = 0;
   for (int i = 0; i < prior_.size(); ++i) {
     const bool used = next < fused_.size() && fused_[next].id == prior_.ids[i];

@@ -3,9 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <opencv2/imgproc.hpp>
-
-#include "support/recorded_sequence.h"
+#include "active_matching_slam/evaluation/recorded_sequence.h"
+#include "active_matching_slam/evaluation/trajectory_error.h"
+#include "active_matching_slam/tracker/tracker.h"
+#include "support/recorded_data.h"
 
 namespace active_matching_slam {
 namespace {
@@ -29,6 +30,7 @@ TrackedRun trackAll(const std::string& name, int every, TrackerOptions options, 
       run.tracked.push_back({stamp_s, frame->camera.poseWorldCamera()});
     run.pixels += frame->matching.statistics.pixels_searched;
     run.pixels_full_gates += frame->matching.statistics.pixels_full_gates;
+    return true;
   });
   return run;
 }

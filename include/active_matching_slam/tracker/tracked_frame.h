@@ -7,9 +7,11 @@
 #include <vector>
 
 #include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/image/template.h"
 #include "active_matching_slam/information/mutual_information_graph.h"
 #include "active_matching_slam/information/submap_hierarchy.h"
 #include "active_matching_slam/matching/match_result.h"
+#include "active_matching_slam/matching/measurement_prior.h"
 
 namespace active_matching_slam {
 
@@ -80,6 +82,10 @@ struct TrackedFrame {
   std::vector<std::vector<SearchMatch>> matches;  ///< all matches met, per candidate
   std::vector<int> candidates;  ///< index into `features` of each entry of the MeasurementPrior
   MatchResult matching;
+  /// What the matcher was given, so that a frame can be matched again: the prediction, and one
+  /// template for each of its entries. Empty when nothing was predicted.
+  MeasurementPrior prior;
+  std::vector<Template> templates;
   int features_started = 0, features_retired = 0, features_converted = 0;
   std::int64_t retired_total = 0;
   int resets = 0;  ///< resets since construction
