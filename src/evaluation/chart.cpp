@@ -193,6 +193,9 @@ cv::Mat drawBarChart(const BarChart& chart, int width_px, int height_px) {
     totals.push_back(0.0);
     for (const double value : bar.values) totals.back() += valueOf(value);
   }
+  // Room for the legend above the bars.
+  const double highest = totals.empty() ? 1.0 : *std::max_element(totals.begin(), totals.end());
+  totals.push_back(highest * (1.0 + 0.09 * static_cast<double>(chart.parts.size())));
   const Axis y(totals, false, true);
   sheet.drawYTicks(y, false);
   const double step = panel.width / std::max(1.0, static_cast<double>(chart.bars.size()));

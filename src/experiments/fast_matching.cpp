@@ -21,7 +21,7 @@ ExperimentResult runFastMatching(Workbench& bench) {
                            many, matchers, spuriousOf),
                timesByFeatures(bench, "fast_active", 30.0), timesByFeatures(bench, "jcbb", 30.0),
                timesByRate(bench, "fast_active", many), timesByRate(bench, "jcbb", many)},
-              2));
+              3));
   const auto pixels = ratiosByRate(bench, many, "jcbb", "fast_active", pixelsOf);
   result.findings.push_back({text("pixels JCBB : FAM, %d features", many),
                              "significantly fewer at low rates", byRateText(bench, pixels, "%.1f"),

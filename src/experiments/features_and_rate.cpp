@@ -31,7 +31,7 @@ ExperimentResult runFeaturesAndRate(Workbench& bench) {
                timesByRate(bench, "active", few), timesByRate(bench, "jcbb", few),
                timesByRate(bench, "active", bench.quick() ? most : 40),
                timesByRate(bench, "jcbb", bench.quick() ? most : 40)},
-              2));
+              3));
 
   // Every cell of every sequence: does AM search less than JCBB?
   int cells = 0, fewer = 0, fewer_spurious = 0;

@@ -15,23 +15,24 @@ struct Definition {
   const char* name;
   const char* scene;   ///< of the simulator; null for a recording
   const char* motion;  ///< of the simulator; the folder of a recording
+  int width, height;   ///< of the simulator
   double seconds;
   double sigma_acceleration, sigma_angular_acceleration;
 };
 
-/// Accelerations in map units (the median depth) and radians. A slow hand's are a tenth of a fast
-/// one's.
+/// Accelerations in map units (the median depth) and radians. A slow hand's are a fraction of a
+/// fast one's.
 constexpr Definition kDefinitions[] = {
-    {"office_slow", "office", "slow", 10.0, 0.6, 0.7},
-    {"office_fast", "office", "jerky", 10.0, 2.0, 5.0},
-    {"walkway_slow", "walkway", "slow", 10.0, 0.6, 0.7},
-    {"walkway_fast", "walkway", "jerky", 10.0, 2.0, 5.0},
-    {"walkway_straight", "walkway", "forward", 10.0, 0.6, 0.7},
-    {"two_depths", "two_depths", "circle", 15.0, 1.0, 1.0},
-    {"wall", "wall", "sideways", 15.0, 1.0, 1.0},
-    {"corridor", "corridor", "forward", 15.0, 1.0, 1.0},
-    {"desk", nullptr, "davison_monoslam_desk", 15.0, 4.0, 4.0},
-    {"checkerboard", nullptr, "uzh_vamr_checkerboard", 15.0, 6.0, 6.0},
+    {"office_slow", "office", "slow", 1024, 768, 8.0, 1.0, 1.2},
+    {"office_fast", "office", "jerky", 1024, 768, 8.0, 3.0, 6.0},
+    {"walkway_slow", "walkway", "slow", 1024, 768, 8.0, 1.0, 1.2},
+    {"walkway_fast", "walkway", "jerky", 1024, 768, 8.0, 3.0, 6.0},
+    {"walkway_straight", "walkway", "forward", 1024, 768, 8.0, 1.0, 1.2},
+    {"two_depths", "two_depths", "circle", 640, 480, 12.0, 1.0, 1.2},
+    {"wall", "wall", "sideways", 640, 480, 12.0, 1.0, 1.2},
+    {"corridor", "corridor", "forward", 640, 480, 12.0, 1.0, 1.2},
+    {"desk", nullptr, "davison_monoslam_desk", 0, 0, 15.0, 6.0, 6.0},
+    {"checkerboard", nullptr, "uzh_vamr_checkerboard", 0, 0, 15.0, 6.0, 10.0},
 };
 
 const Definition& definitionOf(const std::string& name) {
@@ -44,8 +45,8 @@ void simulate(const Definition& definition, bool quick, Sequence* sequence) {
   SimulatorOptions options;
   options.scene = definition.scene;
   options.motion = definition.motion;
-  options.width = quick ? 512 : 1024;
-  options.height = quick ? 384 : 768;
+  options.width = quick ? definition.width / 2 : definition.width;
+  options.height = quick ? definition.height / 2 : definition.height;
   options.duration_s = quick ? 4.0 : definition.seconds;
   Simulator simulator(options);
   sequence->camera = simulator.camera();
