@@ -14,11 +14,11 @@ namespace {
 
 constexpr double kRightPx = 3.0;  ///< of the reference: farther is another place
 
-/// The thesis has no stop rule; the cap, far above what it met, only bounds the worst frame.
+/// The thesis has no stop rule and met at most 10 Gaussians; the cap bounds the worst frame.
 MatchOptions thesisOptions() {
   MatchOptions options;
   options.update_rule = UpdateRule::kThesis;
-  options.max_gaussians = 200;
+  options.max_gaussians = 25;
   options.default_rates.true_positive = 0.8;
   options.use_feature_rates = false;
   options.clock_s = threadSeconds;

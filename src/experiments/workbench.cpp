@@ -86,11 +86,12 @@ const std::vector<TestBedCell>& Workbench::testBed() {
       options.features = featureCounts().back();
       options.problems = quick() ? 4 : 10;
       const Recording& reference = recording(name, options);
-      say(text("all matchers on %d frames of %s at %.4g Hz (%d of %d frames tracked)",
-               static_cast<int>(reference.problems.size()), name.c_str(), 30.0 / every,
-               reference.tracked, reference.frames));
-      for (const int features : featureCounts())
+      for (const int features : featureCounts()) {
+        say(text("all matchers with %d features on %d frames of %s at %.4g Hz (%d of %d tracked)",
+                 features, static_cast<int>(reference.problems.size()), name.c_str(), 30.0 / every,
+                 reference.tracked, reference.frames));
         addCells(sequence(name), 30.0 / every, features, reference.problems, &test_bed_);
+      }
     }
   return test_bed_;
 }
