@@ -24,15 +24,15 @@ struct Definition {
 /// fast one's.
 constexpr Definition kDefinitions[] = {
     {"office_slow", "office", "slow", 1024, 768, 8.0, 0.8, 0.9},
-    {"office_fast", "office", "jerky", 1024, 768, 8.0, 2.0, 4.0},
+    {"office_fast", "office", "jerky", 1024, 768, 8.0, 1.5, 2.5},
     {"walkway_slow", "walkway", "slow", 1024, 768, 8.0, 0.8, 0.9},
-    {"walkway_fast", "walkway", "jerky", 1024, 768, 8.0, 2.0, 4.0},
+    {"walkway_fast", "walkway", "jerky", 1024, 768, 8.0, 1.5, 2.5},
     {"walkway_straight", "walkway", "forward", 1024, 768, 8.0, 0.8, 0.9},
     {"two_depths", "two_depths", "circle", 640, 480, 12.0, 1.0, 1.0},
     {"wall", "wall", "sideways", 640, 480, 12.0, 1.0, 1.0},
     {"corridor", "corridor", "forward", 640, 480, 12.0, 1.0, 1.0},
     {"desk", nullptr, "davison_monoslam_desk", 0, 0, 15.0, 4.0, 4.0},
-    {"checkerboard", nullptr, "uzh_vamr_checkerboard", 0, 0, 15.0, 5.0, 6.0},
+    {"checkerboard", nullptr, "uzh_vamr_checkerboard", 0, 0, 15.0, 4.0, 4.0},
 };
 
 const Definition& definitionOf(const std::string& name) {

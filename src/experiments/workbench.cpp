@@ -81,10 +81,13 @@ const std::vector<TestBedCell>& Workbench::testBed() {
   if (!test_bed_.empty()) return test_bed_;
   for (const std::string& name : testBedSequences())
     for (const int every : everies()) {
+      // A hasty hand between images so far apart: the ellipses cover the image, nothing is
+      // predicted.
+      if (every == 8 && name.find("_fast") != std::string::npos) continue;
       RecordingOptions options;
       options.every = every;
       options.features = featureCounts().back();
-      options.problems = quick() ? 4 : 10;
+      options.problems = quick() ? 4 : 8;
       const Recording& reference = recording(name, options);
       for (const int features : featureCounts()) {
         say(text("all matchers with %d features on %d frames of %s at %.4g Hz (%d of %d tracked)",
