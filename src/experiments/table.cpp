@@ -1,6 +1,5 @@
 #include "active_matching_slam/experiments/table.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,15 +8,16 @@
 namespace active_matching_slam {
 namespace {
 
+std::string quoted(const std::string& cell) {
+  if (cell.find_first_of(",\"\n") == std::string::npos) return cell;
+  std::string text = "\"";
+  for (const char c : cell) text += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return text + "\"";
+}
+
 std::string line(const std::vector<std::string>& cells) {
   std::string text;
-  for (const std::string& cell : cells) {
-    if (&cell != &cells.front()) text += ',';
-    std::string safe = cell;
-    std::replace(safe.begin(), safe.end(), ',', ';');
-    std::replace(safe.begin(), safe.end(), '\n', ' ');
-    text += safe;
-  }
+  for (std::size_t i = 0; i < cells.size(); ++i) text += (i > 0 ? "," : "") + quoted(cells[i]);
   return text + "\n";
 }
 

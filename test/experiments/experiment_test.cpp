@@ -47,7 +47,7 @@ TEST(Table, IsWrittenAsCommaSeparatedText) {
   Table table({"name", "value"});
   table.add({"a, b", 0.5});
   table.add({"c", std::nan("")});
-  EXPECT_EQ(table.csv(), "name,value\na; b,0.5\nc,\n");
+  EXPECT_EQ(table.csv(), "name,value\n\"a, b\",0.5\nc,\n");
   EXPECT_THROW(table.add({"only one"}), std::invalid_argument);
 }
 

@@ -31,7 +31,7 @@ class Table {
   void add(const std::vector<Cell>& cells);
   int rows() const { return static_cast<int>(rows_.size()); }
 
-  /// Comma separated, the names in the first line; commas in text become semicolons.
+  /// Comma separated, the names in the first line; text with commas in it is quoted.
   std::string csv() const;
 
  private:
