@@ -26,12 +26,12 @@ cv::Scalar colourOf(std::size_t series) {
 /// Values of one axis to the unit interval.
 class Axis {
  public:
+  /// `values`: finite, and positive on a logarithmic axis.
   Axis(const std::vector<double>& values, bool logarithmic, bool from_zero)
       : logarithmic_(logarithmic) {
     low_ = std::numeric_limits<double>::infinity();
     high_ = -low_;
     for (const double value : values) {
-      if (!isShown(value)) continue;
       low_ = std::min(low_, position(value));
       high_ = std::max(high_, position(value));
     }
@@ -39,13 +39,10 @@ class Axis {
     if (from_zero && !logarithmic) low_ = std::min(low_, 0.0);
     if (high_ - low_ < 1e-12 * (1.0 + std::abs(high_))) low_ -= 0.5, high_ += 0.5;
     const double margin = 0.05 * (high_ - low_);
-    if (low_ != 0.0 || logarithmic) low_ -= margin;
+    if (!from_zero || low_ != 0.0 || logarithmic) low_ -= margin;
     high_ += margin;
   }
 
-  bool isShown(double value) const {
-    return std::isfinite(value) && (!logarithmic_ || value > 0.0);
-  }
   double span() const { return high_ - low_; }
   /// Shows more, the same in the middle.
   void widen(double span) {
@@ -145,9 +142,14 @@ struct Sheet {
 cv::Mat drawLineChart(const LineChart& chart, int width_px, int height_px) {
   Sheet sheet(width_px, height_px, chart.title, chart.x_label, chart.y_label);
   const cv::Rect& panel = sheet.panel;
+  const auto isShown = [&](const Eigen::Vector2d& point) {
+    return point.allFinite() && (!chart.log_x || point.x() > 0.0) &&
+           (!chart.log_y || point.y() > 0.0);
+  };
   std::vector<double> xs, ys;
   for (const ChartSeries& series : chart.series)
     for (const Eigen::Vector2d& point : series.points) {
+      if (!isShown(point)) continue;
       xs.push_back(point.x());
       ys.push_back(point.y());
     }
@@ -168,7 +170,7 @@ cv::Mat drawLineChart(const LineChart& chart, int width_px, int height_px) {
   for (std::size_t s = 0; s < chart.series.size(); ++s) {
     std::vector<cv::Point> line;
     for (const Eigen::Vector2d& point : chart.series[s].points)
-      if (x.isShown(point.x()) && y.isShown(point.y()))
+      if (isShown(point))
         line.emplace_back(static_cast<int>(std::lround(column(point.x()))),
                           sheet.row(y.unit(point.y()), chart.y_down));
     cv::polylines(sheet.picture, line, false, colourOf(s), 2, cv::LINE_AA);
