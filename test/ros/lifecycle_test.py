@@ -14,7 +14,6 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rosgraph_msgs.msg import Log
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -27,7 +26,6 @@ class LifecycleTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.log = harness.Inbox('/rosout', Log)
         cls.recording = harness.Recording(rospy.get_param('~bag'))
         cls.feeder = harness.Feeder('/tracker')
         cls.second_states = harness.Inbox('/second/state', TrackingState)
@@ -190,8 +188,12 @@ class LifecycleTest(unittest.TestCase):
         rospy.set_param('/measured/known_target', target)
         rospy.set_param('/measured/tf_mode', 'none')
         self.addCleanup(rospy.delete_param, '/measured')
-        node = subprocess.Popen(['rosrun', 'active_matching_slam', 'active_matching_slam_node',
-                                 '__name:=measured', 'image:=/measured_camera/image_raw'])
+        printed = os.path.join(rospy.get_param('/tracker/data_directory'), 'measured.log')
+        with open(printed, 'w') as output:
+            node = subprocess.Popen(
+                ['rosrun', 'active_matching_slam', 'active_matching_slam_node',
+                 '__name:=measured', 'image:=/measured_camera/image_raw'],
+                stdout=output, env=dict(os.environ, ROSCONSOLE_STDOUT_LINE_BUFFERED='1'))
         self.addCleanup(node.wait)
         self.addCleanup(node.terminate)
         feeder = harness.Feeder('/measured', '/measured_camera/image_raw',
@@ -206,8 +208,8 @@ class LifecycleTest(unittest.TestCase):
         self.assertEqual(TrackingState.SCALE_KNOWN_POINTS, state.scale_source)
         message = statistics.wait_for_stamp(self.image(2).header.stamp)
         self.assertEqual(TrackingState.SCALE_KNOWN_POINTS, message.scale_source)
-        self.assertIsNotNone(self.log.wait_for(lambda m: m.name == '/measured' and
-                                               'scale comes from ' + target in m.msg))
+        with open(printed) as output:
+            self.assertIn('scale comes from ' + target, output.read())
         self.assertIsNotNone(diagnostics.wait_for(lambda m: any(
             status.name.endswith('measured: tracking') and
             any(v.key == 'scale' and v.value == 'known_points' for v in status.values)
