@@ -1,23 +1,31 @@
 """What the tests with a ROS master share: a bag fed in lock-step, and mathematics of poses.
 
-Each image is published only after the tracker has answered the one before, so that no test depends on
-the speed of the machine.
+Each image is published only after the tracker has answered the one before, and connections are
+waited for until both sides know of them, so that no test depends on the speed of the machine.
 """
 
 import copy
 import math
 import struct
 import threading
+import time
+import unittest
+import warnings
 import zlib
 
 import numpy as np
 import rosbag
+import rosgraph
 import rospy
+import rosservice
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_srvs.srv import Trigger
 
 IMAGE_TOPIC = '/camera/image_raw'
 INFO_TOPIC = '/camera/camera_info'
 TRUTH_TOPIC = '/ground_truth/pose'
+# Until something that must happen counts as never to happen.
+PATIENCE_S = 120.0
 
 
 class Recording:
@@ -48,14 +56,32 @@ def as_class(message, kind):
     return copied
 
 
+def settle(node):
+    """Comes back when the node has taken in all that has been sent to it.
+
+    The thread that reads its topics also answers what the type of a service is, here of one that
+    every node has.
+    """
+    def answers():
+        try:
+            return rosservice.get_service_type(node + '/get_loggers') is not None
+        except rosservice.ROSServiceException:  # busy for seconds: asked again
+            return False
+    wait_until(answers, what='answer of ' + node)
+
+
 class Inbox:
-    """Collects the messages of a topic; waits for the one with a stamp."""
+    """Collects the messages of a topic; waits for the one with a stamp.
+
+    Nothing that is published once it is constructed is missed: all publishers know of it by then.
+    """
 
     def __init__(self, topic, kind):
         self.topic = topic
         self.messages = []
         self._changed = threading.Condition()
         self._subscriber = rospy.Subscriber(topic, kind, self._receive, queue_size=1000)
+        wait_until(self.connected, what='connection to ' + topic)
 
     def _receive(self, message):
         with self._changed:
@@ -66,17 +92,27 @@ class Inbox:
         with self._changed:
             self.messages = []
 
-    def wait_for(self, accept, timeout_s=30.0):
+    def wait_for(self, accept, timeout_s=PATIENCE_S):
         """The first message that `accept` takes; None after the timeout."""
         with self._changed:
             self._changed.wait_for(lambda: any(accept(m) for m in self.messages), timeout_s)
             return next((m for m in self.messages if accept(m)), None)
 
-    def wait_for_stamp(self, stamp, timeout_s=30.0):
+    def wait_for_stamp(self, stamp, timeout_s=PATIENCE_S):
         return self.wait_for(lambda m: stamp_of(m) == stamp, timeout_s)
 
     def connected(self):
-        return self._subscriber.get_num_connections() > 0
+        """With all publishers of the topic that there are now, and there is one."""
+        topics = rosgraph.Master(rospy.get_name()).getSystemState()[0]
+        publishers = set(dict(topics).get(self.topic, []))
+        # rospy counts a connection before the other side knows of it; a header is the other's answer.
+        answered = {connection.callerid_pub for connection in self._subscriber.impl.connections
+                    if connection.header}
+        if not publishers or not publishers <= answered:
+            return False
+        for node in publishers:
+            settle(node)
+        return True
 
     def close(self):
         self._subscriber.unregister()
@@ -89,47 +125,130 @@ def stamp_of(message):
     return inner[-1].header.stamp if inner else None
 
 
-def wait_until(condition, timeout_s=30.0, what='a condition'):
+def wait_until(condition, timeout_s=PATIENCE_S, what='a condition'):
     """Polls by real time; fails with a name."""
-    waited = 0.0
+    end = time.monotonic() + timeout_s
     while not condition():
-        if waited > timeout_s:
+        if time.monotonic() > end:
             raise AssertionError('no %s within %g s' % (what, timeout_s))
         threading.Event().wait(0.02)
-        waited += 0.02
+
+
+def publisher(topic, kind):
+    """Hands messages over within publish(): no thread behind it that may come later."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore', SyntaxWarning)  # wants a queue
+        return rospy.Publisher(topic, kind, tcp_nodelay=True, queue_size=None)
 
 
 class Feeder:
-    """Publishes images and waits for the tracker's ~state of each."""
+    """Publishes images and waits for the ~state of each from one or more trackers on them."""
 
-    def __init__(self, tracker='/tracker', image_topic=IMAGE_TOPIC, info_topic=INFO_TOPIC,
+    def __init__(self, trackers, image_topic=IMAGE_TOPIC, info_topic=INFO_TOPIC,
                  image_class=Image):
         from active_matching_slam.msg import TrackingState
-        self.images = rospy.Publisher(image_topic, image_class, queue_size=10)
-        self.infos = rospy.Publisher(info_topic, CameraInfo, queue_size=10)
-        self.states = Inbox(tracker + '/state', TrackingState)
-        wait_until(lambda: self.images.get_num_connections() > 0
-                   and self.infos.get_num_connections() > 0 and self.states.connected(),
-                   what='connection with ' + tracker)
+        self.images = publisher(image_topic, image_class)
+        self.infos = publisher(info_topic, CameraInfo)
+        self._tracker_nodes = set()
+        for tracker in trackers:
+            self._tracker_nodes.add(node_of(tracker))
+        self.states = {tracker: Inbox(tracker + '/state', TrackingState) for tracker in trackers}
+        wait_until(lambda: self._tracker_nodes <= listeners(self.images)
+                   and self._tracker_nodes <= listeners(self.infos),
+                   what='connection with ' + ', '.join(trackers))
 
-    def feed(self, image, info=None, expect_answer=True, timeout_s=30.0):
-        """Returns the tracker's state after the image, or None when it must not answer."""
+    def feed(self, image, info=None):
+        """The first tracker's state after the image, which all have answered."""
+        return next(iter(self.feed_all(image, info).values()))
+
+    def feed_all(self, image, info=None):
+        """The trackers' states after the image, by name."""
+        self._send(image, info)
+        states = {tracker: inbox.wait_for_stamp(image.header.stamp)
+                  for tracker, inbox in self.states.items()}
+        for tracker, state in states.items():
+            if state is None:
+                raise AssertionError('%s: no state for the image at %s' %
+                                     (tracker, image.header.stamp))
+        return states
+
+    def feed_in_vain(self, image, info=None, patience_s=0.3):
+        """An image that must not be answered. The answer, should there be one."""
+        self._send(image, info)
+        threading.Event().wait(patience_s)
+        answers = [inbox.wait_for_stamp(image.header.stamp, 0.0) for inbox in self.states.values()]
+        return next((answer for answer in answers if answer is not None), None)
+
+    def _send(self, image, info):
         if info is not None:
             self.calibrate(info)
-        self.states.clear()
+        for inbox in self.states.values():
+            inbox.clear()
         self.images.publish(image)
-        if not expect_answer:
-            threading.Event().wait(timeout_s)
-            return self.states.wait_for_stamp(image.header.stamp, 0.0)
-        state = self.states.wait_for_stamp(image.header.stamp, timeout_s)
-        if state is None:
-            raise AssertionError('no state for the image at %s' % image.header.stamp)
-        return state
 
     def calibrate(self, info):
         """camera_info and images travel on two connections: lets the first arrive."""
         self.infos.publish(info)
-        threading.Event().wait(0.3)
+        for node in self._tracker_nodes:
+            settle(node)
+
+
+def node_of(tracker):
+    """The node (for a nodelet, its manager) in which a tracker runs; waits until it is there."""
+    rospy.wait_for_service(tracker + '/reset', PATIENCE_S)
+    return rosservice.get_service_node(tracker + '/reset')
+
+
+def listeners(publisher):
+    """Names of the nodes connected to a rospy publisher."""
+    return {connection.endpoint_id for connection in publisher.impl.connections}
+
+
+class TrackerTestCase(unittest.TestCase):
+    """Tests of `trackers` on one camera: the parameter ~bag, in lock-step.
+
+    Each test starts without a map, later than the one before: tf takes nothing twice.
+    """
+
+    trackers = ('/tracker', )
+
+    @classmethod
+    def setUpClass(cls):
+        cls.recording = Recording(rospy.get_param('~bag'))
+        cls.images = cls.recording.images
+        cls.feeder = Feeder(cls.trackers)
+        cls.feeder.calibrate(cls.recording.info)
+        cls.shift = rospy.Duration(0)
+
+    def setUp(self):
+        self.start_anew()
+
+    def start_anew(self):
+        for tracker in self.trackers:
+            self.assertTrue(self.service('reset', Trigger, tracker)().success)
+        type(self).shift += rospy.Duration(1000)
+
+    def service(self, name, kind, tracker=None):
+        """A service of a tracker: the first, where none is named."""
+        name = (tracker or self.trackers[0]) + '/' + name
+        rospy.wait_for_service(name, PATIENCE_S)
+        return rospy.ServiceProxy(name, kind)
+
+    def inbox(self, topic, kind, tracker=None):
+        """Of a tracker's topic (as service()), or of one that begins with '/'; ends with the test."""
+        if not topic.startswith('/'):
+            topic = (tracker or self.trackers[0]) + '/' + topic
+        inbox = Inbox(topic, kind)
+        self.addCleanup(inbox.close)
+        return inbox
+
+    def image(self, index, pixels=None):
+        image = self.images[index]
+        return image_like(image, image.header.stamp + self.shift, pixels)
+
+    def run_images(self, first, last):
+        """The first tracker's states for images first to last - 1."""
+        return [self.feeder.feed(self.image(i)) for i in range(first, last)]
 
 
 def matrix_of_pose(pose):

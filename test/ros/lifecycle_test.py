@@ -5,16 +5,15 @@ Parameters: ~bag. Nodes under test: /tracker, and /second (tf_mode none) on the 
 """
 
 import os
+import signal
 import subprocess
 import sys
-import unittest
 
 import numpy as np
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from active_matching_slam.msg import FeatureArray, MatchingStatistics, TrackingState
@@ -22,67 +21,29 @@ from active_matching_slam.srv import LoadMap, SaveMap, SetScale
 import harness
 
 
-class LifecycleTest(unittest.TestCase):
+class LifecycleTest(harness.TrackerTestCase):
 
-    @classmethod
-    def setUpClass(cls):
-        cls.recording = harness.Recording(rospy.get_param('~bag'))
-        cls.feeder = harness.Feeder('/tracker')
-        cls.second_states = harness.Inbox('/second/state', TrackingState)
-        harness.wait_until(lambda: cls.second_states.connected() and
-                           cls.feeder.images.get_num_connections() >= 2, what='the second tracker')
-        cls.feeder.calibrate(cls.recording.info)
-        cls.shift = rospy.Duration(0)
-
-    def setUp(self):
-        for tracker in ('/tracker', '/second'):
-            self.service(tracker + '/reset', Trigger)()
-        LifecycleTest.shift += rospy.Duration(100)
-
-    def service(self, name, kind):
-        rospy.wait_for_service(name, 30)
-        return rospy.ServiceProxy(name, kind)
-
-    def inbox(self, topic, kind):
-        inbox = harness.Inbox(topic, kind)
-        self.addCleanup(inbox.close)
-        harness.wait_until(inbox.connected, what='connection to ' + topic)
-        rospy.sleep(0.2)
-        return inbox
-
-    def image(self, index, pixels=None):
-        image = self.recording.images[index]
-        return harness.image_like(image, image.header.stamp + self.shift, pixels)
-
-    def feed(self, image):
-        """The states of both trackers."""
-        first = self.feeder.feed(image)
-        second = self.second_states.wait_for_stamp(image.header.stamp)
-        self.assertIsNotNone(second)
-        return first, second
-
-    def run_images(self, first, last):
-        return [self.feed(self.image(i))[0] for i in range(first, last)]
+    trackers = ('/tracker', '/second')
 
     # -- lost and found ------------------------------------------------------------------------
 
     def test_a_kidnapped_camera_is_lost_and_found_again_in_the_same_map(self):
-        features = self.inbox('/tracker/features', FeatureArray)
-        poses = self.inbox('/tracker/pose', PoseWithCovarianceStamped)
+        features = self.inbox('features', FeatureArray)
+        poses = self.inbox('pose', PoseWithCovarianceStamped)
         resets = self.run_images(0, 60)[-1].resets
         before = {f.id for f in features.wait_for_stamp(self.image(59).header.stamp).features}
         # Another place: the pictures upside down and mirrored, one after the other.
         for index in range(60, 90):
-            pixels = harness.pixels_of(self.recording.images[index])[::-1]
-            state, _ = self.feed(self.image(index, pixels))
+            pixels = harness.pixels_of(self.images[index])[::-1]
+            state = self.feeder.feed(self.image(index, pixels))
         self.assertEqual(TrackingState.LOST, state.state)
         self.assertNotEqual('', state.reason)
         self.assertEqual(resets, state.resets)
         away = self.image(89).header.stamp
-        states = self.run_images(90, len(self.recording.images))
+        states = self.run_images(90, len(self.images))
         self.assertEqual(TrackingState.TRACKING, states[-1].state, states[-1].reason)
         self.assertEqual(resets, states[-1].resets)
-        last = self.image(len(self.recording.images) - 1).header.stamp
+        last = self.image(len(self.images) - 1).header.stamp
         after = {f.id for f in features.wait_for_stamp(last).features}
         self.assertGreater(len(before & after), len(before) // 2)
 
@@ -101,14 +62,14 @@ class LifecycleTest(unittest.TestCase):
     # -- maps ----------------------------------------------------------------------------------
 
     def test_a_saved_map_serves_another_tracker(self):
-        first_poses = self.inbox('/tracker/pose', PoseWithCovarianceStamped)
-        second_poses = self.inbox('/second/pose', PoseWithCovarianceStamped)
+        first_poses = self.inbox('pose', PoseWithCovarianceStamped)
+        second_poses = self.inbox('pose', PoseWithCovarianceStamped, '/second')
         self.run_images(0, 60)
-        self.assertTrue(self.service('/tracker/set_scale', SetScale)(2.0).success)
-        self.assertTrue(self.service('/tracker/save_map', SaveMap)('shared.map').success)
-        self.assertTrue(self.service('/second/load_map', LoadMap)('shared.map').success)
+        self.assertTrue(self.service('set_scale', SetScale)(2.0).success)
+        self.assertTrue(self.service('save_map', SaveMap)('shared.map').success)
+        self.assertTrue(self.service('load_map', LoadMap, '/second')('shared.map').success)
         for index in range(60, 90):
-            _, second = self.feed(self.image(index))
+            second = self.feeder.feed_all(self.image(index))['/second']
         self.assertEqual(TrackingState.TRACKING, second.state, second.reason)
         self.assertEqual('service', second.scale_source_name)
         stamp = self.image(89).header.stamp
@@ -119,16 +80,16 @@ class LifecycleTest(unittest.TestCase):
         self.assertLess(harness.angle_between(first, second), 0.02)
 
     def test_a_damaged_or_foreign_file_changes_nothing(self):
-        features = self.inbox('/tracker/features', FeatureArray)
+        features = self.inbox('features', FeatureArray)
         resets = self.run_images(0, 30)[-1].resets
-        answer = self.service('/tracker/save_map', SaveMap)('whole.map')
+        answer = self.service('save_map', SaveMap)('whole.map')
         self.assertTrue(answer.success, answer.message)
         with open(answer.message, 'rb') as file:
             whole = file.read()
         folder = os.path.dirname(answer.message)
         flipped = bytearray(whole)
         flipped[len(flipped) // 2] ^= 4
-        load = self.service('/tracker/load_map', LoadMap)
+        load = self.service('load_map', LoadMap)
         for name, content, cause in (('cut.map', whole[:len(whole) // 2], 'bytes'),
                                      ('flipped.map', bytes(flipped), 'checksum'),
                                      ('foreign.map', b'%YAML:1.0\nimage_width: 640\n',
@@ -147,7 +108,7 @@ class LifecycleTest(unittest.TestCase):
         self.assertGreater(len(before & after), 0.8 * len(before))
 
     def test_there_is_no_map_to_save_after_a_reset(self):
-        answer = self.service('/tracker/save_map', SaveMap)('none.map')
+        answer = self.service('save_map', SaveMap)('none.map')
         self.assertFalse(answer.success)
         self.assertIn('no map', answer.message)
 
@@ -155,11 +116,11 @@ class LifecycleTest(unittest.TestCase):
 
     def write_known_points(self, path, count):
         """Points of the map as a tracker saw them, far apart in the first image."""
-        features = self.inbox('/tracker/features', FeatureArray)
+        features = self.inbox('features', FeatureArray)
         self.run_images(0, 1)
         first = {f.id: f for f in features.wait_for_stamp(self.image(0).header.stamp).features}
-        self.run_images(1, len(self.recording.images))
-        last = self.image(len(self.recording.images) - 1).header.stamp
+        self.run_images(1, len(self.images))
+        last = self.image(len(self.images) - 1).header.stamp
         K = np.array(self.recording.info.K).reshape(3, 3)
         known = []
         for feature in features.wait_for_stamp(last).features:
@@ -195,10 +156,10 @@ class LifecycleTest(unittest.TestCase):
                  '__name:=measured', 'image:=/measured_camera/image_raw'],
                 stdout=output, env=dict(os.environ, ROSCONSOLE_STDOUT_LINE_BUFFERED='1'))
         self.addCleanup(node.wait)
-        self.addCleanup(node.terminate)
-        feeder = harness.Feeder('/measured', '/measured_camera/image_raw',
+        self.addCleanup(node.send_signal, signal.SIGINT)
+        feeder = harness.Feeder(['/measured'], '/measured_camera/image_raw',
                                 '/measured_camera/camera_info')
-        statistics = self.inbox('/measured/statistics', MatchingStatistics)
+        statistics = self.inbox('statistics', MatchingStatistics, '/measured')
         diagnostics = self.inbox('/diagnostics', DiagnosticArray)
         feeder.calibrate(self.recording.info)
         for index in range(3):
@@ -219,7 +180,7 @@ class LifecycleTest(unittest.TestCase):
 
     def test_tf_mode_none_sends_no_transform(self):
         transforms = self.inbox('/tf', TFMessage)
-        poses = self.inbox('/second/pose', PoseWithCovarianceStamped)
+        poses = self.inbox('pose', PoseWithCovarianceStamped, '/second')
         self.run_images(0, 5)
         self.assertIsNotNone(poses.wait_for_stamp(self.image(4).header.stamp))
         self.assertIsNotNone(transforms.wait_for_stamp(self.image(4).header.stamp))

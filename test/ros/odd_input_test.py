@@ -9,7 +9,6 @@ import copy
 import os
 import random
 import sys
-import unittest
 
 import numpy as np
 import rospy
@@ -17,7 +16,6 @@ import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import Image
-from std_srvs.srv import Trigger
 
 from active_matching_slam.msg import FeatureArray, MatchingStatistics, TrackingState
 import harness
@@ -33,49 +31,17 @@ class TruncatedImage(Image):
         buff.seek(0, 2)
 
 
-class OddInputTest(unittest.TestCase):
-
-    @classmethod
-    def setUpClass(cls):
-        cls.recording = harness.Recording(rospy.get_param('~bag'))
-        cls.images = cls.recording.images
-        cls.feeder = harness.Feeder()
-        cls.shift = rospy.Duration(0)
-        cls.feeder.calibrate(cls.recording.info)
-
-    def setUp(self):
-        self.reset()
-        OddInputTest.shift += rospy.Duration(100)
-
-    def reset(self):
-        rospy.wait_for_service('/tracker/reset', 30)
-        self.assertTrue(rospy.ServiceProxy('/tracker/reset', Trigger)().success)
-
-    def inbox(self, topic, kind):
-        inbox = harness.Inbox('/tracker/' + topic, kind)
-        self.addCleanup(inbox.close)
-        harness.wait_until(inbox.connected, what='connection to ' + topic)
-        rospy.sleep(0.2)  # the other side counts its listeners a little later
-        return inbox
-
-    def image(self, index, pixels=None):
-        image = self.images[index]
-        return harness.image_like(image, image.header.stamp + self.shift, pixels)
-
-    def run_images(self, first, last):
-        """States of images first to last - 1."""
-        return [self.feeder.feed(self.image(i)) for i in range(first, last)]
+class OddInputTest(harness.TrackerTestCase):
 
     def test_an_uncalibrated_camera_waits_and_a_calibrated_one_starts(self):
         self.addCleanup(self.feeder.calibrate, self.recording.info)
         inbox = self.inbox('pose', PoseWithCovarianceStamped)
         bad = copy.deepcopy(self.recording.info)
         bad.K = [0.0] * 9
-        self.assertIsNone(self.feeder.feed(self.image(0), bad, expect_answer=False, timeout_s=0.5))
+        self.assertIsNone(self.feeder.feed_in_vain(self.image(0), bad))
         for broken in ([float('nan')] * 9, [-1.0] + list(self.recording.info.K[1:])):
             bad.K = broken
-            self.assertIsNone(
-                self.feeder.feed(self.image(1), bad, expect_answer=False, timeout_s=0.5))
+            self.assertIsNone(self.feeder.feed_in_vain(self.image(1), bad))
         self.assertEqual([], inbox.messages)
         state = self.feeder.feed(self.image(2), self.recording.info)
         self.assertEqual(TrackingState.TRACKING, state.state)
@@ -106,7 +72,7 @@ class OddInputTest(unittest.TestCase):
             image = copy.copy(self.image(3))
             for field, value in spoil.items():
                 setattr(image, field, value)
-            self.feeder.feed(image, expect_answer=False, timeout_s=0.1)
+            self.assertIsNone(self.feeder.feed_in_vain(image, patience_s=0.1), spoil)
         self.assertEqual(TrackingState.TRACKING, self.run_images(4, 8)[-1].state)
 
     def test_every_usual_encoding_is_tracked(self):
@@ -116,7 +82,7 @@ class OddInputTest(unittest.TestCase):
         for index, (encoding, pixels) in enumerate(
                 [('mono8', gray), ('bgr8', color), ('rgb8', color), ('mono16', deep),
                  ('bayer_rggb8', gray)]):
-            self.reset()
+            self.start_anew()
             image = self.image(index)
             image.encoding = encoding
             image.is_bigendian = 0
@@ -141,8 +107,7 @@ class OddInputTest(unittest.TestCase):
         resets = self.run_images(0, 5)[-1].resets
         broken = copy.deepcopy(self.recording.info)
         broken.K = [0.0] * 9
-        self.assertIsNone(self.feeder.feed(self.image(5), broken, expect_answer=False,
-                                           timeout_s=0.3))
+        self.assertIsNone(self.feeder.feed_in_vain(self.image(5), broken))
         state = self.feeder.feed(self.image(6), self.recording.info)
         self.assertEqual(TrackingState.TRACKING, state.state)
         self.assertEqual(resets, state.resets, 'the map waited')
@@ -200,8 +165,7 @@ class OddInputTest(unittest.TestCase):
                     self.assertTrue(all(harness.all_finite(m) for m in inbox.messages), inbox.topic)
                     inbox.clear()
         self.feeder.calibrate(self.recording.info)
-        self.reset()
-        OddInputTest.shift += rospy.Duration(100)
+        self.start_anew()
         self.assertEqual(TrackingState.TRACKING, self.run_images(0, 5)[-1].state)
 
 

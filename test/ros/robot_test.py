@@ -19,6 +19,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CompressedImage
+from tf2_msgs.msg import TFMessage
 
 from active_matching_slam.msg import TrackingState
 import harness
@@ -57,9 +58,11 @@ class RobotTest(unittest.TestCase):
         cls.listener = tf2_ros.TransformListener(cls.buffer)
         cls.broadcaster = tf2_ros.TransformBroadcaster()
         cls.fixed_broadcaster = tf2_ros.StaticTransformBroadcaster()
+        transforms = harness.Inbox('/tf', TFMessage)  # the listener's connection is the same
+        transforms.close()
 
     def lookup(self, parent, child, stamp):
-        transform = self.buffer.lookup_transform(parent, child, stamp, rospy.Duration(20)).transform
+        transform = self.buffer.lookup_transform(parent, child, stamp, rospy.Duration(harness.PATIENCE_S)).transform
         return harness.matrix_of(transform.translation, transform.rotation)
 
     def odometry(self, index):
@@ -82,18 +85,17 @@ class RobotTest(unittest.TestCase):
             transform_message(T_BASE_CAMERA, first_stamp, 'base_link', self.camera_frame))
         self.broadcaster.sendTransform(
             transform_message(self.odometry(0), first_stamp, 'odom', 'base_link'))
-        feeder = harness.Feeder('/robot')
-        base_states = harness.Inbox('/base/state', TrackingState)
+        feeder = harness.Feeder(['/robot', '/base'])
+        nodes = {'/robot', '/base'}
+        harness.wait_until(lambda: nodes <= harness.listeners(self.broadcaster.pub_tf) and
+                           nodes <= harness.listeners(self.fixed_broadcaster.pub_tf),
+                           what='listeners')
         poses = harness.Inbox('/robot/pose', PoseWithCovarianceStamped)
         odometry = harness.Inbox('/base/odometry', Odometry)
         base_poses = harness.Inbox('/base/pose', PoseWithCovarianceStamped)
-        harness.wait_until(lambda: poses.connected() and odometry.connected() and
-                           base_poses.connected() and base_states.connected(), what='connections')
         feeder.calibrate(self.recording.info)
         for index in range(COUNT):
             self.feed(feeder, index)
-            self.assertIsNotNone(
-                base_states.wait_for_stamp(self.recording.images[index].header.stamp))
 
         last = self.recording.images[COUNT - 1].header.stamp
         pose = poses.wait_for_stamp(last)
@@ -121,7 +123,7 @@ class RobotTest(unittest.TestCase):
         self.assertLess(np.abs(T_world_base.dot(T_BASE_CAMERA) - camera).max(), 1e-6)
 
     def test_compressed_images_are_tracked_without_a_plugin(self):
-        feeder = harness.Feeder('/compressed', '/packed/image_raw/compressed',
+        feeder = harness.Feeder(['/compressed'], '/packed/image_raw/compressed',
                                 '/packed/camera_info', CompressedImage)
         feeder.calibrate(self.recording.info)
         for index in range(5):
@@ -131,7 +133,7 @@ class RobotTest(unittest.TestCase):
         self.assertEqual(TrackingState.TRACKING, state.state, state.reason)
         image.header.stamp += rospy.Duration(1)
         image.data = image.data[:50]
-        self.assertIsNone(feeder.feed(image, expect_answer=False, timeout_s=0.3))
+        self.assertIsNone(feeder.feed_in_vain(image))
         image.header.stamp += rospy.Duration(1)
         image.data = harness.png(harness.pixels_of(self.recording.images[6]))
         self.assertIsNotNone(feeder.feed(image))

@@ -5,9 +5,9 @@ Parameters: ~bag. In /manager: /one and /twin (the same settings), /rival (anoth
 camera, /other on another.
 """
 
+import signal
 import subprocess
 import sys
-import unittest
 
 import rospy
 import rostest
@@ -18,55 +18,31 @@ from active_matching_slam.msg import MatchingStatistics, TrackingState
 from active_matching_slam.srv import SetMatcher
 import harness
 
-TRACKERS = ('/one', '/twin', '/rival')
+class SeveralTest(harness.TrackerTestCase):
 
-
-class SeveralTest(unittest.TestCase):
+    trackers = ('/one', '/twin', '/rival')
 
     @classmethod
     def setUpClass(cls):
-        cls.recording = harness.Recording(rospy.get_param('~bag'))
-        cls.feeder = harness.Feeder('/one')
-        cls.states = {name: harness.Inbox(name + '/state', TrackingState) for name in TRACKERS}
-        harness.wait_until(lambda: all(inbox.connected() for inbox in cls.states.values()) and
-                           cls.feeder.images.get_num_connections() > 0, what='three trackers')
-        cls.other = harness.Feeder('/other', '/other_camera/image_raw', '/other_camera/camera_info')
-        cls.feeder.calibrate(cls.recording.info)
+        super().setUpClass()
+        cls.other = harness.Feeder(['/other'], '/other_camera/image_raw',
+                                   '/other_camera/camera_info')
         cls.other.calibrate(cls.recording.info)
-        cls.shift = rospy.Duration(0)
 
-    def setUp(self):
-        for name in TRACKERS + ('/other', ):
-            self.assertTrue(self.service(name + '/reset', Trigger)().success)
-        SeveralTest.shift += rospy.Duration(100)
-
-    def service(self, name, kind):
-        rospy.wait_for_service(name, 30)
-        return rospy.ServiceProxy(name, kind)
+    def start_anew(self):
+        super().start_anew()
+        self.assertTrue(self.service('reset', Trigger, '/other')().success)
 
     def inboxes(self, topic, kind):
-        inboxes = {name: harness.Inbox(name + topic, kind) for name in TRACKERS}
-        for inbox in inboxes.values():
-            self.addCleanup(inbox.close)
-        harness.wait_until(lambda: all(i.connected() for i in inboxes.values()), what=topic)
-        rospy.sleep(0.2)
-        return inboxes
+        return {name: self.inbox(topic, kind, name) for name in self.trackers}
 
-    def image(self, index):
-        image = self.recording.images[index]
-        return harness.image_like(image, image.header.stamp + self.shift)
-
-    def feed(self, index, among=TRACKERS):
+    def feed(self, index):
         """States of the trackers on the first camera."""
-        image = self.image(index)
-        self.feeder.feed(image)
-        states = {name: self.states[name].wait_for_stamp(image.header.stamp) for name in among}
-        self.assertNotIn(None, states.values())
-        return states
+        return self.feeder.feed_all(self.image(index))
 
     def test_each_gives_what_it_gives_alone(self):
-        poses = self.inboxes('/pose', PoseWithCovarianceStamped)
-        statistics = self.inboxes('/statistics', MatchingStatistics)
+        poses = self.inboxes('pose', PoseWithCovarianceStamped)
+        statistics = self.inboxes('statistics', MatchingStatistics)
         for index in range(40):
             states = self.feed(index)
             self.other.feed(self.image(index))
@@ -75,21 +51,22 @@ class SeveralTest(unittest.TestCase):
         stamp = self.image(39).header.stamp
         one, twin = (poses[name].wait_for_stamp(stamp).pose for name in ('/one', '/twin'))
         self.assertEqual(one, twin, 'bit for bit')
-        told = [statistics[name].wait_for_stamp(stamp) for name in TRACKERS]
+        told = [statistics[name].wait_for_stamp(stamp) for name in self.trackers]
         self.assertEqual(['active', 'active', 'jcbb'], [message.matcher for message in told])
         self.assertEqual(told[0].pixels_searched, told[1].pixels_searched)
         self.assertNotEqual(told[0].pixels_searched, told[2].pixels_searched)
 
     def test_reset_settings_and_odd_input_of_one_are_its_own(self):
-        statistics = self.inboxes('/statistics', MatchingStatistics)
+        statistics = self.inboxes('statistics', MatchingStatistics)
         for index in range(10):
             before = self.feed(index)
-        self.assertTrue(self.service('/rival/reset', Trigger)().success)
-        self.addCleanup(self.service('/rival/set_matcher', SetMatcher), 'jcbb')
-        self.assertTrue(self.service('/rival/set_matcher', SetMatcher)('active_search').success)
+        self.assertTrue(self.service('reset', Trigger, '/rival')().success)
+        set_matcher = self.service('set_matcher', SetMatcher, '/rival')
+        self.addCleanup(set_matcher, 'jcbb')
+        self.assertTrue(set_matcher('active_search').success)
         broken = self.image(10)
         broken.data = b'odd'
-        self.other.feed(broken, expect_answer=False, timeout_s=0.3)
+        self.assertIsNone(self.other.feed_in_vain(broken))
         after = self.feed(10)
         self.assertEqual(before['/rival'].resets + 1, after['/rival'].resets)
         self.assertEqual(before['/one'].resets, after['/one'].resets)
@@ -102,17 +79,19 @@ class SeveralTest(unittest.TestCase):
         for index in range(5):
             self.feed(index)
         subprocess.run(['rosrun', 'nodelet', 'nodelet', 'unload', '/rival', '/manager'], check=True)
-        harness.wait_until(lambda: not self.states['/rival'].connected(), what='the end of one')
+        rival = self.feeder.states.pop('/rival')
+        harness.wait_until(lambda: not rival.connected(), what='the end of one')
         for index in range(5, 10):
-            states = self.feed(index, ('/one', '/twin'))
+            states = self.feed(index)
         self.assertEqual(TrackingState.TRACKING, states['/one'].state)
         again = subprocess.Popen(['rosrun', 'nodelet', 'nodelet', 'load',
                                   'active_matching_slam/TrackerNodelet', '/manager',
                                   '__name:=rival', 'image:=/camera/image_raw'])
-        self.addCleanup(again.wait)
-        self.addCleanup(again.terminate)
-        harness.wait_until(self.states['/rival'].connected, what='the one that is loaded again')
-        self.assertTrue(self.service('/rival/reset', Trigger)().success)
+        self.addClassCleanup(again.wait)  # unloads it when it ends
+        self.addClassCleanup(again.send_signal, signal.SIGINT)
+        harness.node_of('/rival')
+        harness.wait_until(rival.connected, what='the one that is loaded again')
+        self.feeder.states['/rival'] = rival
         self.feeder.calibrate(self.recording.info)
         states = self.feed(10)
         self.assertEqual(TrackingState.TRACKING, states['/rival'].state)

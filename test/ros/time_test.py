@@ -7,16 +7,17 @@ there. The test is the clock.
 
 import sys
 import threading
-import unittest
 
 import rospy
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
+from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock, Log
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 
 from active_matching_slam.msg import TrackingState
 import harness
@@ -27,57 +28,41 @@ def wait(seconds):
     threading.Event().wait(seconds)
 
 
-class TimeTest(unittest.TestCase):
+class TimeTest(harness.TrackerTestCase):
+
+    trackers = ('/tracker', '/waiting')
 
     @classmethod
     def setUpClass(cls):
         cls.clock = rospy.Publisher('/clock', Clock, queue_size=10, latch=True)
         cls.set_clock(rospy.Time(1000))
+        super().setUpClass()
         cls.log = harness.Inbox('/rosout', Log)
-        cls.recording = harness.Recording(rospy.get_param('~bag'))
-        cls.feeder = harness.Feeder('/tracker')
-        cls.waiting = harness.Inbox('/waiting/state', TrackingState)
-        harness.wait_until(lambda: cls.waiting.connected() and
-                           cls.feeder.images.get_num_connections() >= 2, what='both trackers')
-        cls.feeder.calibrate(cls.recording.info)
-        cls.start = rospy.Time(1000)
 
     def setUp(self):
-        for tracker in ('/tracker', '/waiting'):
-            self.assertTrue(self.reset(tracker).success)
-        TimeTest.start += rospy.Duration(1000)
+        super().setUp()
+        self.start = rospy.Time(1000) + self.shift
         self.said_before = len(self.log.messages)
 
     @classmethod
     def set_clock(cls, time):
         cls.clock.publish(Clock(clock=time))
 
-    def reset(self, tracker):
-        rospy.wait_for_service(tracker + '/reset', 30)
-        return rospy.ServiceProxy(tracker + '/reset', Trigger)()
-
-    def feed(self, index, stamp):
-        """The clock shows the image's stamp, as rosbag play --clock has it."""
-        self.set_clock(stamp)
-        return self.feeder.feed(harness.image_like(self.recording.images[index], stamp))
+    def stamp(self, index, offset=0.0):
+        return self.start + rospy.Duration(offset + index / 30.0)
 
     def run_images(self, first, last, offset=0.0):
+        """The clock shows the images' stamps, as rosbag play --clock has it."""
         states = []
         for index in range(first, last):
-            stamp = self.start + rospy.Duration(offset + index / 30.0)
-            states.append(self.feed(index, stamp))
+            stamp = self.stamp(index, offset)
+            self.set_clock(stamp)
+            states.append(self.feeder.feed(harness.image_like(self.images[index], stamp)))
         return states
 
     def warnings(self, text):
         return [m for m in self.log.messages[self.said_before:]
                 if m.name == '/tracker' and text in m.msg]
-
-    def inbox(self, topic, kind):
-        inbox = harness.Inbox(topic, kind)
-        self.addCleanup(inbox.close)
-        harness.wait_until(inbox.connected, what='connection to ' + topic)
-        wait(0.2)
-        return inbox
 
     # -- simulated time ------------------------------------------------------------------------
 
@@ -93,24 +78,20 @@ class TimeTest(unittest.TestCase):
     def test_transforms_go_on_after_a_jump_back(self):
         self.run_images(0, 5)
         self.run_images(0, 5, offset=-500.0)
-        buffer = tf2_ros.Buffer()
-        listener = tf2_ros.TransformListener(buffer)
-        wait(0.5)
+        transforms = self.inbox('/tf', TFMessage)
         self.run_images(5, 10, offset=-500.0)
-        stamp = self.start + rospy.Duration(-500.0 + 9 / 30.0)
-        frame = self.recording.images[0].header.frame_id
-        harness.wait_until(lambda: buffer.can_transform('world', frame, stamp), what='transform')
-        listener.unregister()
+        message = transforms.wait_for_stamp(self.stamp(9, -500.0))
+        self.assertIsNotNone(message)
+        self.assertEqual('world', message.transforms[0].header.frame_id)
 
     def test_a_clock_that_stands_still_stops_nothing(self):
         diagnostics = self.inbox('/diagnostics', DiagnosticArray)
-        odometry = self.inbox('/waiting/odometry', Odometry)
-        poses = self.inbox('/waiting/pose', PoseWithCovarianceStamped)
+        odometry = self.inbox('odometry', Odometry, '/waiting')
+        poses = self.inbox('pose', PoseWithCovarianceStamped, '/waiting')
         self.set_clock(self.start)
         for index in range(10):  # stamps run on, the clock does not
-            stamp = self.start + rospy.Duration(index / 30.0)
-            state = self.feeder.feed(harness.image_like(self.recording.images[index], stamp))
-            self.assertIsNotNone(self.waiting.wait_for_stamp(stamp))
+            stamp = self.stamp(index)
+            state = self.feeder.feed(harness.image_like(self.images[index], stamp))
         self.assertEqual(TrackingState.TRACKING, state.state)
         diagnostics.clear()
         self.assertIsNotNone(diagnostics.wait_for(lambda message: True))
@@ -119,14 +100,15 @@ class TimeTest(unittest.TestCase):
         self.assertEqual([], odometry.messages)
         self.assertIsNotNone(self.log.wait_for(
             lambda m: m.name == '/waiting' and 'No transform from base_link' in m.msg))
-        self.assertTrue(self.reset('/waiting').success)
+        self.assertTrue(self.service('reset', Trigger, '/waiting')().success)
 
     def test_a_transform_that_comes_late_is_waited_for_while_the_clock_stands_still(self):
-        odometry = self.inbox('/waiting/odometry', Odometry)
+        odometry = self.inbox('odometry', Odometry, '/waiting')
         broadcaster = tf2_ros.TransformBroadcaster()
-        wait(0.5)
+        node = harness.node_of('/waiting')
+        harness.wait_until(lambda: node in harness.listeners(broadcaster.pub_tf), what='listener')
         self.set_clock(self.start)
-        frame = self.recording.images[0].header.frame_id
+        frame = self.images[0].header.frame_id
 
         def send(stamp):
             transform = TransformStamped()
@@ -135,15 +117,20 @@ class TimeTest(unittest.TestCase):
             transform.transform.rotation.w = 1.0
             broadcaster.sendTransform(transform)
 
-        for index in range(12):
-            stamp = self.start + rospy.Duration(index / 30.0)
-            sender = threading.Timer(0.01, send, [stamp])
+        # Long enough on a busy machine; and from now on there is a robot, so something to wait for.
+        settings = Client('/waiting', timeout=harness.PATIENCE_S)
+        self.addCleanup(settings.update_configuration,
+                        {'tf_timeout_s': rospy.get_param('/waiting/tf_timeout_s')})
+        settings.update_configuration({'tf_timeout_s': 5.0})
+        send(self.start)
+        harness.settle(node)
+        for index in range(6):
+            stamp = self.stamp(index)
+            sender = threading.Timer(0.1, send, [stamp])
             sender.start()
-            self.feeder.feed(harness.image_like(self.recording.images[index], stamp))
-            self.assertIsNotNone(self.waiting.wait_for_stamp(stamp))
+            self.feeder.feed(harness.image_like(self.images[index], stamp))
+            self.assertIsNotNone(odometry.wait_for_stamp(stamp), index)
             sender.join()
-            wait(0.05)
-        harness.wait_until(lambda: len(odometry.messages) > 2, what='odometry')
 
     # -- stamps --------------------------------------------------------------------------------
 
@@ -161,8 +148,8 @@ class TimeTest(unittest.TestCase):
 
     def test_an_image_without_a_stamp_is_left_out_and_named(self):
         self.run_images(0, 5)
-        image = harness.image_like(self.recording.images[5], rospy.Time())
-        self.feeder.feed(image, expect_answer=False, timeout_s=0.3)
+        image = harness.image_like(self.images[5], rospy.Time())
+        self.assertIsNone(self.feeder.feed_in_vain(image))
         harness.wait_until(lambda: self.warnings('image without a stamp'), what='a warning')
         states = self.run_images(6, 10)
         self.assertEqual(TrackingState.TRACKING, states[-1].state)

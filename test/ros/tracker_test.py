@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 """The tracker in a ROS graph, as node and as nodelet: pose, tf, covariances, stamps, services.
 
-Parameters: ~bag (simulated, with truth), ~tracker (name of the node under test).
+Parameters: ~bag (simulated, with truth). Node under test: /tracker.
 """
 
 import math
 import os
 import sys
-import unittest
 
 import numpy as np
 import rospy
@@ -36,42 +35,15 @@ TOPICS = {
 }
 
 
-class TrackerTest(unittest.TestCase):
+class TrackerTest(harness.TrackerTestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.tracker = rospy.get_param('~tracker')
-        cls.recording = harness.Recording(rospy.get_param('~bag'))
-        cls.images = cls.recording.images
-        cls.feeder = harness.Feeder(cls.tracker)
+        super().setUpClass()
         cls.buffer = tf2_ros.Buffer(cache_time=rospy.Duration(1000))
         cls.listener = tf2_ros.TransformListener(cls.buffer)
-        cls.shift = rospy.Duration(0)
-        cls.feeder.calibrate(cls.recording.info)
-
-    def setUp(self):
-        """Each test starts without a map, later than the one before: tf takes nothing twice."""
-        self.service('reset', Trigger)()
-        TrackerTest.shift += rospy.Duration(100)
-
-    def service(self, name, kind):
-        rospy.wait_for_service(self.tracker + '/' + name, 30)
-        return rospy.ServiceProxy(self.tracker + '/' + name, kind)
-
-    def inbox(self, topic, kind):
-        inbox = harness.Inbox(self.tracker + '/' + topic, kind)
-        self.addCleanup(inbox.close)
-        harness.wait_until(inbox.connected, what='connection to ' + topic)
-        rospy.sleep(0.2)  # the other side counts its listeners a little later
-        return inbox
-
-    def image(self, index, pixels=None):
-        image = self.images[index]
-        return harness.image_like(image, image.header.stamp + self.shift, pixels)
-
-    def run_images(self, first, last):
-        """States of images first to last - 1."""
-        return [self.feeder.feed(self.image(i)) for i in range(first, last)]
+        transforms = harness.Inbox('/tf', TFMessage)  # the listener's connection is the same
+        transforms.close()
 
     def poses(self, inbox, count):
         stamps = [self.image(i).header.stamp for i in range(count)]
@@ -102,7 +74,7 @@ class TrackerTest(unittest.TestCase):
         self.run_images(0, len(self.images))
         last = self.image(len(self.images) - 1)
         transform = self.buffer.lookup_transform('world', last.header.frame_id, last.header.stamp,
-                                                 rospy.Duration(20))
+                                                 rospy.Duration(harness.PATIENCE_S))
         T_world_camera = harness.matrix_of(transform.transform.translation,
                                            transform.transform.rotation)
         truth = self.recording.truth_from_first(
@@ -124,7 +96,7 @@ class TrackerTest(unittest.TestCase):
             self.assertEqual(self.images[0].header.frame_id, odom.child_frame_id)
             self.assertNotEqual(odom.header.frame_id, odom.child_frame_id)
             transform = self.buffer.lookup_transform(
-                odom.header.frame_id, odom.child_frame_id, odom.header.stamp, rospy.Duration(20))
+                odom.header.frame_id, odom.child_frame_id, odom.header.stamp, rospy.Duration(harness.PATIENCE_S))
             difference = harness.matrix_of_pose(pose.pose.pose) - harness.matrix_of(
                 transform.transform.translation, transform.transform.rotation)
             self.assertLess(np.abs(difference).max(), 1e-9)
@@ -162,15 +134,13 @@ class TrackerTest(unittest.TestCase):
 
     def test_every_topic_carries_the_stamp_of_its_image_and_nothing_is_nan(self):
         inboxes = {name: self.inbox(name, kind) for name, kind in TOPICS.items()}
-        diagnostics = harness.Inbox('/diagnostics', DiagnosticArray)
-        self.addCleanup(diagnostics.close)
-        transforms = harness.Inbox('/tf', TFMessage)
-        self.addCleanup(transforms.close)
+        diagnostics = self.inbox('/diagnostics', DiagnosticArray)
+        transforms = self.inbox('/tf', TFMessage)
         self.run_images(0, 12)
         last = self.image(11)
         self.assertIsNotNone(transforms.wait_for_stamp(last.header.stamp))
         for name, inbox in inboxes.items():
-            message = inbox.wait_for_stamp(last.header.stamp, 10.0)
+            message = inbox.wait_for_stamp(last.header.stamp)
             self.assertIsNotNone(message, '%s has no message for the last image' % name)
             for message in inbox.messages:
                 self.assertTrue(harness.all_finite(message), '%s: not a number' % name)
@@ -234,8 +204,7 @@ class TrackerTest(unittest.TestCase):
 
     def test_a_lost_camera_claims_no_pose_and_says_why(self):
         self.run_images(0, 10)
-        transforms = harness.Inbox('/tf', TFMessage)
-        self.addCleanup(transforms.close)
+        transforms = self.inbox('/tf', TFMessage)
         inbox = self.inbox('pose', PoseWithCovarianceStamped)
         noise = np.random.RandomState(1)
         shape = (self.images[0].height, self.images[0].width)
@@ -322,7 +291,7 @@ class TrackerTest(unittest.TestCase):
         self.assertIn('magic', answer.message)
 
     def test_reconfigure_applies_clips_and_refuses_by_name(self):
-        client = Client(self.tracker, timeout=20)
+        client = Client(self.trackers[0], timeout=harness.PATIENCE_S)
         self.addCleanup(client.update_configuration, {'map/features_per_frame': 60,
                                                       'image/match_threshold': 0.8})
         self.run_images(0, 3)
@@ -334,7 +303,7 @@ class TrackerTest(unittest.TestCase):
         self.assertLessEqual(message.candidates, 10)
         result = client.update_configuration({'image/match_threshold': 5.0})
         self.assertEqual(0.999, result['image/match_threshold'])
-        self.assertEqual(0.999, rospy.get_param(self.tracker + '/image/match_threshold'))
+        self.assertEqual(0.999, rospy.get_param('/tracker/image/match_threshold'))
         with self.assertRaises(Exception):
             client.update_configuration({'no/such/setting': 1})
         self.assertEqual(TrackingState.TRACKING, self.run_images(5, 6)[-1].state)
