@@ -28,29 +28,38 @@ sensor_msgs::CameraInfoConstPtr readCameraInfo(const ros::NodeHandle& node,
   return boost::make_shared<sensor_msgs::CameraInfo>(manager.getCameraInfo());
 }
 
-bool isRemapped(const ros::NodeHandle& node, const std::string& name) {
-  return node.resolveName(name, true) != node.resolveName(name, false);
+/// A name beside the node, before and after remapping.
+std::string nameBeside(const ros::NodeHandle& private_node, const std::string& name) {
+  return ros::names::append(ros::names::parentNamespace(private_node.getNamespace()), name);
+}
+std::string resolve(const ros::NodeHandle& private_node, const std::string& name) {
+  return private_node.resolveName(nameBeside(private_node, name));
+}
+
+std::string infoTopicOf(const ros::NodeHandle& private_node, const std::string& image_topic) {
+  const std::string topic = resolve(private_node, "camera_info");
+  const bool remapped = topic != nameBeside(private_node, "camera_info");
+  return remapped ? topic : image_transport::getCameraInfoTopic(image_topic);
 }
 
 }  // namespace
 
 cv::Mat CameraImage::toGray() const { return raw ? toGrayImage(*raw) : toGrayImage(*compressed); }
 
-CameraSubscription::CameraSubscription(const ros::NodeHandle& node,
+CameraSubscription::CameraSubscription(const ros::NodeHandle& private_node,
                                        const std::string& camera_info_url, double silence_timeout_s)
-    : node_(node),
+    : node_(private_node),
       silence_timeout_s_(silence_timeout_s),
-      image_topic_(node.resolveName("image")),
-      info_topic_(isRemapped(node, "camera_info")
-                      ? node.resolveName("camera_info")
-                      : image_transport::getCameraInfoTopic(image_topic_)),
-      image_transport_(node),
-      info_(readCameraInfo(node, camera_info_url)),
+      image_topic_(resolve(private_node, "image")),
+      info_topic_(infoTopicOf(private_node, image_topic_)),
+      image_transport_(private_node),
+      info_(readCameraInfo(private_node, camera_info_url)),
       last_image_(ros::WallTime::now()) {}
 
 void CameraSubscription::start(const std::string& transport, Callback callback) {
   callback_ = std::move(callback);
   info_subscriber_ = node_.subscribe(info_topic_, 2, &CameraSubscription::onCameraInfo, this);
+  const std::string base_topic = image_topic_;
   if (transport != "raw") image_topic_ += "/" + transport;
   const auto plugins = image_transport_.getLoadableTransports();
   const bool installed =
@@ -63,7 +72,7 @@ void CameraSubscription::start(const std::string& transport, Callback callback) 
           deliver(std::move(image));
         };
     image_subscriber_ = image_transport_.subscribe(
-        "image", kQueueSize, receive, ros::VoidPtr(),
+        base_topic, kQueueSize, receive, ros::VoidPtr(),
         image_transport::TransportHints(transport, ros::TransportHints().tcpNoDelay()));
   } else if (transport == "compressed") {
     const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> receive =

@@ -6,8 +6,8 @@ namespace active_matching_slam {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-NodeDiagnostics::NodeDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
-    : node_(private_node), updater_(node, private_node, private_node.getNamespace()) {
+NodeDiagnostics::NodeDiagnostics(const ros::NodeHandle& private_node)
+    : node_(private_node), updater_(private_node, private_node, private_node.getNamespace()) {
   updater_.setHardwareID("none");
 }
 

@@ -21,11 +21,11 @@ NodeSettings readNodeSettings(const ros::NodeHandle& private_node) {
   return settings;
 }
 
-TrackerRos::TrackerRos(const ros::NodeHandle& node, const ros::NodeHandle& private_node)
+TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
     : private_node_(private_node),
       settings_(readNodeSettings(private_node)),
       data_directory_(settings_.node.data_directory),
-      diagnostics_(node, private_node),
+      diagnostics_(private_node),
       options_(settings_.node),
       session_(settings_.tracker),
       publisher_(private_node, settings_.node),
@@ -33,7 +33,7 @@ TrackerRos::TrackerRos(const ros::NodeHandle& node, const ros::NodeHandle& priva
       trajectory_(settings_.node.trajectory_length) {
   worker_ = std::make_unique<FrameWorker<CameraImage>>(
       [this](const CameraImage& image) { process(image); });
-  subscription_ = std::make_unique<CameraSubscription>(node, options_.camera_info_url,
+  subscription_ = std::make_unique<CameraSubscription>(private_node, options_.camera_info_url,
                                                        options_.no_image_timeout_s);
   subscription_->start(options_.image_transport,
                        [this](const CameraImage& image) { worker_->post(image); });

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Several trackers in one nodelet manager don't disturb each other.
 
-Parameters: ~bag. In /manager: /one and /twin (the same settings), /rival (another matcher) on one
+Parameters: ~bag. In /driver/manager: /one and /twin (the same settings), /rival (another matcher) on one
 camera, /other on another.
 """
 
@@ -78,14 +78,14 @@ class SeveralTest(harness.TrackerTestCase):
     def test_one_that_is_unloaded_leaves_the_others(self):
         for index in range(5):
             self.feed(index)
-        subprocess.run(['rosrun', 'nodelet', 'nodelet', 'unload', '/rival', '/manager'], check=True)
+        subprocess.run(['rosrun', 'nodelet', 'nodelet', 'unload', '/rival', '/driver/manager'], check=True)
         rival = self.feeder.states.pop('/rival')
         harness.wait_until(lambda: not rival.connected(), what='the end of one')
         for index in range(5, 10):
             states = self.feed(index)
         self.assertEqual(TrackingState.TRACKING, states['/one'].state)
         again = subprocess.Popen(['rosrun', 'nodelet', 'nodelet', 'load',
-                                  'active_matching_slam/TrackerNodelet', '/manager',
+                                  'active_matching_slam/TrackerNodelet', '/driver/manager',
                                   '__name:=rival', 'image:=/camera/image_raw'])
         self.addClassCleanup(again.wait)  # unloads it when it ends
         self.addClassCleanup(again.send_signal, signal.SIGINT)

@@ -29,13 +29,16 @@ struct CameraImage {
 /// Subscribes to `image` by image_transport and to its camera_info: the topic beside it, or
 /// `camera_info` when that is remapped. Says so when nothing comes.
 ///
+/// Both names are relative to the namespace that `private_node` is in: for a nodelet its own, not
+/// that of its manager, in which its remappings would not hold.
+///
 /// Transport 'compressed' works without its plugin: the jpeg or png is decoded here.
 class CameraSubscription {
  public:
   using Callback = std::function<void(const CameraImage&)>;
 
   /// Throws std::invalid_argument for a `camera_info_url` that can't be read.
-  CameraSubscription(const ros::NodeHandle& node, const std::string& camera_info_url,
+  CameraSubscription(const ros::NodeHandle& private_node, const std::string& camera_info_url,
                      double silence_timeout_s);
 
   /// `callback` runs in the thread that serves the node's callbacks. Throws std::invalid_argument

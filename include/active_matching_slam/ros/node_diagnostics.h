@@ -22,7 +22,7 @@ class NodeDiagnostics {
     std::string topic;
   };
 
-  NodeDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node);
+  explicit NodeDiagnostics(const ros::NodeHandle& private_node);
 
   /// Begins to report. `images` is called at each report, from the thread that serves the node's
   /// callbacks.

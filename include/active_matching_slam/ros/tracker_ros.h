@@ -41,7 +41,7 @@ NodeSettings readNodeSettings(const ros::NodeHandle& private_node);
 class TrackerRos {
  public:
   /// Throws as readNodeSettings() does.
-  TrackerRos(const ros::NodeHandle& node, const ros::NodeHandle& private_node);
+  explicit TrackerRos(const ros::NodeHandle& private_node);
   ~TrackerRos();
 
  private:

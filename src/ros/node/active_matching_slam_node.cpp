@@ -2,9 +2,9 @@
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "active_matching_slam");
-  const ros::NodeHandle node, private_node("~");
+  const ros::NodeHandle private_node("~");
   try {
-    active_matching_slam::TrackerRos tracker(node, private_node);
+    active_matching_slam::TrackerRos tracker(private_node);
     ros::spin();
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM(error.what());

@@ -10,7 +10,7 @@ namespace active_matching_slam {
 class TrackerNodelet : public nodelet::Nodelet {
   void onInit() override {
     try {
-      tracker_ = std::make_unique<TrackerRos>(getNodeHandle(), getPrivateNodeHandle());
+      tracker_ = std::make_unique<TrackerRos>(getPrivateNodeHandle());
     } catch (const std::exception& error) {
       NODELET_FATAL_STREAM(error.what());
       throw;  // the manager answers that loading failed
