@@ -15,9 +15,17 @@ add_test(NAME ${PROJECT_NAME}_documents
 set_tests_properties(${PROJECT_NAME}_documents PROPERTIES ENVIRONMENT
   AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
 
+# The commands of the documents as they stand there, and the advice on several machines.
+foreach(name commands machines)
+  add_test(NAME ${PROJECT_NAME}_${name} COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE}
+    ${CMAKE_CURRENT_SOURCE_DIR}/test/documents/${name}_test.py)
+  set_tests_properties(${PROJECT_NAME}_${name} PROPERTIES ENVIRONMENT
+    "AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION};AMS_TEST_BAG=${test_bag};AMS_BUILT=${CMAKE_BINARY_DIR}")
+endforeach()
+
 get_property(tests DIRECTORY PROPERTY TESTS)
 foreach(test ${tests})
-  if(test MATCHES "_rostest_")
+  if(test MATCHES "_rostest_|_commands$|_machines$")
     set_tests_properties(${test} PROPERTIES RUN_SERIAL TRUE)
   endif()
 endforeach()

@@ -130,8 +130,11 @@ int main(int argc, char** argv) {
   } else if (what == "--ros-yaml") {
     printRosYaml();
   } else {
-    std::cerr << "parameter_table [--tracker-yaml | --ros-yaml]\n";
-    return 2;
+    const bool asked = what == "--help" || what == "-h";
+    (asked ? std::cout : std::cerr)
+        << "parameter_table [--tracker-yaml | --ros-yaml]: every parameter with its default, range "
+           "and meaning,\nas the tables of the README, or as the files of config/\n";
+    return asked ? 0 : 2;
   }
   return 0;
 }

@@ -87,6 +87,18 @@ class Documents(unittest.TestCase):
         for name in re.findall(r"`~([\w/]+)`", (SOURCE / "README.md").read_text(encoding="utf-8")):
             self.assertIn('"{}"'.format(name.split("/")[-1]), code, "~" + name)
 
+    def test_every_test_named_exists(self):
+        tests = [path.read_text(encoding="utf-8") for pattern in ("*.py", "*.cpp")
+                 for path in sorted((SOURCE / "test").rglob(pattern))]
+        python = set(re.findall(r"def (test_\w+)\(", "".join(tests)))
+        cpp = {".".join(name) for name in re.findall(r"^TEST(?:_[FP])?\((\w+), (\w+)\)",
+                                                     "".join(tests), re.M)}
+        troubles = (SOURCE / "doc" / "known_troubles.md").read_text(encoding="utf-8")
+        named = re.findall(r"`(test_\w+|[A-Z]\w+\.[A-Z]\w+)`", troubles)
+        self.assertGreater(len(named), 40)
+        for name in named:
+            self.assertIn(name, python | cpp)
+
     def test_the_table_of_parameters_is_what_the_program_prints(self):
         readme = (SOURCE / "README.md").read_text(encoding="utf-8")
         table = readme.split("<!-- parameter_table -->\n")[1].split("<!-- end -->")[0]
@@ -98,6 +110,14 @@ class Documents(unittest.TestCase):
         for place, line in lines():
             for name in re.findall(r"`((?:" + "|".join(groups) + r")/\w+)`", line):
                 self.assertIn(name, known, place)
+
+
+class Programs(unittest.TestCase):
+    def test_no_program_opens_a_window(self):
+        for path in sorted((SOURCE / "src").rglob("*.cpp")):
+            found = re.search(r"\b(imshow|namedWindow|waitKey)\b|highgui",
+                              path.read_text(encoding="utf-8"))
+            self.assertIsNone(found, "{}: {}".format(path, found))
 
 
 if __name__ == "__main__":

@@ -36,6 +36,13 @@ class Network:
     def __init__(self):
         self.suffix = str(os.getpid())
         self.names = []
+        try:
+            self.build()
+        except (OSError, subprocess.CalledProcessError):
+            self.close()
+            raise
+
+    def build(self):
         self.add('switch')
         ip('-n', self.full('switch'), 'link', 'add', 'bridge', 'type', 'bridge')
         ip('-n', self.full('switch'), 'link', 'set', 'bridge', 'up')

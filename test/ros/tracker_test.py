@@ -162,10 +162,26 @@ class TrackerTest(harness.TrackerTestCase):
         self.assertEqual(['x', 'y', 'z', 'sigma', 'id', 'submap', 'rgb'],
                          [field.name for field in cloud.fields])
         self.assertEqual('bgr8', inboxes['debug_image'].wait_for_stamp(last.header.stamp).encoding)
-        own = [name for name in ('images', 'tracking')]
-        harness.wait_until(lambda: all(
-            any(status.name.endswith(': ' + name) for message in diagnostics.messages
-                for status in message.status) for name in own), what='diagnostics')
+        told = {}
+        for name in ('images', 'tracking'):
+            report = diagnostics.wait_for(lambda message: any(
+                status.name.endswith(': ' + name) for status in message.status))
+            told.update((value.key, value.value) for status in report.status
+                        if status.name.endswith(': ' + name) for value in status.values)
+        self.assertLessEqual({
+            'received [Hz]', 'tracked [Hz]', 'dropped', 'latency from stamp, mean [ms]', 'state',
+            'scale', 'matcher', 'features', 'candidates', 'matched', 'resets', 'times lost',
+            'NIS by its degrees of freedom (1 when consistent)'}, set(told))
+
+    def test_what_nobody_listens_to_is_not_computed(self):
+        statistics = self.inbox('statistics', MatchingStatistics)
+        self.run_images(0, 10)
+        self.inbox('submaps', SubmapHierarchy)
+        self.run_images(10, 20)
+        self.assertIsNotNone(statistics.wait_for_stamp(self.image(19).header.stamp))
+        times_ms = [message.structure_ms for message in statistics.messages]
+        self.assertLess(min(times_ms[:10]), 0.001)
+        self.assertGreater(min(times_ms[10:]), 0.001)
 
     def test_path_holds_each_pose_with_its_own_stamp(self):
         inbox = self.inbox('path', Path)
@@ -292,15 +308,16 @@ class TrackerTest(harness.TrackerTestCase):
 
     def test_reconfigure_applies_clips_and_refuses_by_name(self):
         client = Client(self.trackers[0], timeout=harness.PATIENCE_S)
-        self.addCleanup(client.update_configuration, {'map/features_per_frame': 60,
-                                                      'image/match_threshold': 0.8})
-        self.run_images(0, 3)
+        self.addCleanup(client.update_configuration, {
+            'map/features_per_frame': 60, 'image/match_threshold': 0.8, 'matcher': 'auto'})
+        resets = self.run_images(0, 3)[-1].resets
         inbox = self.inbox('statistics', MatchingStatistics)
-        result = client.update_configuration({'map/features_per_frame': 10})
+        result = client.update_configuration({'map/features_per_frame': 10, 'matcher': 'jcbb'})
         self.assertEqual(10, result['map/features_per_frame'])
-        self.run_images(3, 5)
+        self.assertEqual(resets, self.run_images(3, 5)[-1].resets)
         message = inbox.wait_for_stamp(self.image(4).header.stamp)
         self.assertLessEqual(message.candidates, 10)
+        self.assertEqual('jcbb', message.matcher)
         result = client.update_configuration({'image/match_threshold': 5.0})
         self.assertEqual(0.999, result['image/match_threshold'])
         self.assertEqual(0.999, rospy.get_param('/tracker/image/match_threshold'))
