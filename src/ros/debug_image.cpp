@@ -178,9 +178,16 @@ void drawSearches(const TrackedFrame& frame, Canvas* canvas) {
   }
 }
 
+/// Of a feature's matches the best few: where much of the image is searched there are thousands.
 void drawMatches(const TrackedFrame& frame, Canvas* canvas) {
-  for (const auto& matches : frame.matches)
-    for (const SearchMatch& match : matches) canvas->cross(match.pixel, 2.5, kOrange);
+  constexpr std::size_t kMost = 6;
+  for (std::vector<SearchMatch> matches : frame.matches) {
+    const auto end = matches.begin() + std::min(kMost, matches.size());
+    std::partial_sort(matches.begin(), end, matches.end(),
+                      [](const SearchMatch& a, const SearchMatch& b) { return a.score > b.score; });
+    for (auto match = matches.begin(); match != end; ++match)
+      canvas->cross(match->pixel, 2.5, kOrange);
+  }
   for (const TrackedFeature& feature : frame.features) {
     if (feature.status == FeatureStatus::kMatched) {
       canvas->line(feature.predicted_px, feature.matched_px, kGreen);

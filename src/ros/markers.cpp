@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 #include <unordered_map>
 
 #include "active_matching_slam/ros/frame_conversions.h"
@@ -100,12 +101,16 @@ Marker ellipsoidMarker(const std_msgs::Header& header, const std::string& ns, in
   return marker;
 }
 
-/// Sizes of dots and lines follow the scene, since the map unit may be anything.
+/// Sizes of dots and lines follow the scene, since the map unit may be anything: the distance of
+/// what is in view, or of the whole map when nothing is.
 double sceneSize(const TrackedFrame& frame) {
-  std::vector<double> distances;
-  for (const TrackedFeature& feature : frame.features)
-    if (isShowable(feature))
-      distances.push_back((feature.position_world - frame.camera.position_world).norm());
+  std::vector<double> distances, in_view;
+  for (const TrackedFeature& feature : frame.features) {
+    if (!isShowable(feature)) continue;
+    distances.push_back((feature.position_world - frame.camera.position_world).norm());
+    if (feature.status != FeatureStatus::kNotVisible) in_view.push_back(distances.back());
+  }
+  if (!in_view.empty()) distances = std::move(in_view);
   if (distances.empty()) return 1.0;
   const auto middle = distances.begin() + distances.size() / 2;
   std::nth_element(distances.begin(), middle, distances.end());
@@ -307,24 +312,24 @@ MarkerArray cameraMarkers(const TrackedFrame& frame, const CameraCalibration& ca
 }
 
 void MarkerHistory::complete(const std_msgs::Header& header, MarkerArray* markers) {
-  std::set<std::pair<std::string, int>> present;
-  for (const Marker& marker : markers->markers) present.insert({marker.ns, marker.id});
+  ++message_;
+  for (const Marker& marker : markers->markers) last_shown_[{marker.ns, marker.id}] = message_;
   Marker deletion;
   deletion.header = header;
   if (restart_) {
     deletion.action = Marker::DELETEALL;
     markers->markers.insert(markers->markers.begin(), deletion);
-  } else {
-    deletion.action = Marker::DELETE;
-    for (const auto& [ns, id] : shown_) {
-      if (present.count({ns, id})) continue;
-      deletion.ns = ns;
-      deletion.id = id;
-      markers->markers.push_back(deletion);
-    }
   }
   restart_ = false;
-  shown_ = std::move(present);
+  deletion.action = Marker::DELETE;
+  for (auto shown = last_shown_.begin(); shown != last_shown_.end();) {
+    const std::int64_t age = message_ - shown->second;
+    if (age > 0) {
+      std::tie(deletion.ns, deletion.id) = shown->first;
+      markers->markers.push_back(deletion);
+    }
+    shown = age < kRepetitions ? std::next(shown) : last_shown_.erase(shown);
+  }
 }
 
 }  // namespace active_matching_slam

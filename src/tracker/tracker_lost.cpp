@@ -36,7 +36,7 @@ void Tracker::Implementation::judge() {
 /// From here on no pose is claimed. The camera is taken to have stopped somewhere near.
 void Tracker::Implementation::lose(const std::string& reason) {
   state_ = TrackingState::kLost;
-  reason_ = "lost: " + reason;
+  reason_ = reason;
   lost_stamp_s_ = last_stamp_s_;
   poor_frames_ = 0;
   ++times_lost_;

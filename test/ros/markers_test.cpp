@@ -196,6 +196,14 @@ TEST(MarkerHistory, DeletesWhatIsNoMore) {
   EXPECT_EQ(Marker::DELETE, find(markers, "ellipsoids", 2)->action);
   for (const Marker& marker : markers.markers)
     EXPECT_EQ(worldHeader().stamp, marker.header.stamp) << "what is deleted has a stamp too";
+  for (int again = 1; again < MarkerHistory::kRepetitions; ++again) {
+    markers = featureMarkers(frame, worldHeader());
+    history.complete(worldHeader(), &markers);
+    ASSERT_TRUE(find(markers, "ellipsoids", 2)) << "a viewer may have missed it " << again;
+  }
+  markers = featureMarkers(frame, worldHeader());
+  history.complete(worldHeader(), &markers);
+  EXPECT_FALSE(find(markers, "ellipsoids", 2)) << "deletions end";
   history.restart();
   markers = featureMarkers(frame, worldHeader());
   history.complete(worldHeader(), &markers);

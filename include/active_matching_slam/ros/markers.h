@@ -4,7 +4,7 @@
 #include <visualization_msgs/MarkerArray.h>
 
 #include <Eigen/Geometry>
-#include <set>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,14 +54,18 @@ visualization_msgs::MarkerArray cameraMarkers(const TrackedFrame& frame,
 /// Remembers what a topic's viewers hold, so that markers that are no more get deleted.
 class MarkerHistory {
  public:
-  /// Appends a deletion for each marker sent before and not now; begins with a deletion of all
-  /// after restart(), which also serves a viewer that joins late. Deletions carry the header too: a
-  /// message has one stamp, whatever it says.
+  /// So often is a deletion repeated: a viewer that is busy drawing misses messages.
+  static constexpr std::int64_t kRepetitions = 100;
+
+  /// Appends a deletion for each marker of the last kRepetitions messages that is not among these;
+  /// begins with a deletion of all after restart(), which also serves a viewer that joins late.
+  /// Deletions carry the header too: a message has one stamp, whatever it says.
   void complete(const std_msgs::Header& header, visualization_msgs::MarkerArray* markers);
   void restart() { restart_ = true; }
 
  private:
-  std::set<std::pair<std::string, int>> shown_;
+  std::map<std::pair<std::string, int>, std::int64_t> last_shown_;  ///< number of the message
+  std::int64_t message_ = 0;
   bool restart_ = true;
 };
 
