@@ -289,7 +289,7 @@ RECIPES = [
     r'rosrun dynamic_reconfigure .*', r'rosbag record .*',
     # Run by whoever runs this test, or part of what runs above.
     r'scripts/(build|test|demo|images_to_bag)( && source build_release/devel/setup\.bash| --help)?',
-    r'rosbag play --clock', r'rostopic (list|echo)',
+    r'scripts/test --.*', r'rosbag play --clock', r'rostopic (list|echo)',
     # Hours of work; tried in small in test/tools/reproduce_test.cpp.
     r'rosrun %s reproduce .*' % PACKAGE, r'rosrun %s reliability' % PACKAGE, r'scripts/update_.*',
     # Run in machines_test.py.
