@@ -7,6 +7,9 @@
 namespace active_matching_slam {
 namespace {
 
+/// Hypotheses of an ambiguous frame that together weigh as much are the strong ones.
+constexpr double kStrongShare = 0.9;
+
 std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 std::vector<SearchLikelihood> likelihoodsOf(const MeasurementPrior& given, const ProperPrior& prior,
@@ -186,10 +189,9 @@ void MixtureRun::report(MatchResult& result) const {
   result.match_of_feature = result.hypotheses.front().match_of_feature;
   statistics.ambiguous = accepted.weight < options_.ambiguous_below_weight;
   if (!statistics.ambiguous) return;
-  // Strong are the heaviest hypotheses that together reach the weight asked for.
+  // Strong are the heaviest hypotheses that together are almost certain to hold the truth.
   double together = accepted.weight;
-  for (std::size_t k = 1;
-       k < result.hypotheses.size() && together < options_.ambiguous_below_weight; ++k) {
+  for (std::size_t k = 1; k < result.hypotheses.size() && together < kStrongShare; ++k) {
     together += result.hypotheses[k].probability;
     for (std::size_t f = 0; f < result.match_of_feature.size(); ++f)
       if (result.hypotheses[k].match_of_feature[f] != result.match_of_feature[f])

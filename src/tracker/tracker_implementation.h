@@ -27,7 +27,8 @@ class Tracker::Implementation {
         second_search_(options.image),
         relocaliser_(camera, {}, options.map, options.image),
         matcher_(createMatcher(options.matcher)),
-        second_matcher_(createMatcher("one_point_ransac")) {
+        consensus_matcher_(createMatcher("one_point_ransac")),
+        longest_matcher_(createMatcher("jcbb")) {
     checkTrackerOptions(options);
   }
 
@@ -48,6 +49,7 @@ class Tracker::Implementation {
   void follow(const cv::Mat& image, TrackedFrame* frame);
   void predict(double interval_s);
   void measure(const cv::Mat& image);
+  bool askToo(Matcher& matcher, double chi2_per_degree, const cv::Mat& image, TrackedFrame* frame);
   void match(const cv::Mat& image, TrackedFrame* frame);
   void correct(TrackedFrame* frame);
   void judge();
@@ -69,7 +71,8 @@ class Tracker::Implementation {
   FeatureMap map_;
   ImageFeatureSearch search_, second_search_;
   Relocaliser relocaliser_;
-  std::unique_ptr<Matcher> matcher_, second_matcher_;
+  std::unique_ptr<Matcher> matcher_;
+  std::unique_ptr<Matcher> consensus_matcher_, longest_matcher_;  ///< second opinions
   MapStructure structure_;
   MapStructure::Snapshot structure_snapshot_;
 

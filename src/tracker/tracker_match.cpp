@@ -7,7 +7,11 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kPoorShare = 0.6;       ///< of the matches expected: ask twice below
+/// Share of the matches expected below which another matcher is asked too.
+constexpr double kPoorShare = 0.6, kPoorShareWhenAmbiguous = 0.8;
+/// Of JCBB's joint squared distance: 1 is what the truth has on average when the filter's noise is
+/// what it is told, less when it is told more, and chance fills the whole gate of 1.2 to 1.5.
+constexpr double kCloseChi2PerDegree = 0.5;
 constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
 
 }  // namespace
@@ -55,24 +59,42 @@ void Tracker::Implementation::measure(const cv::Mat& image) {
   search_.beginFrame(image, templates_);
 }
 
-/// Asks the matcher. A sequential matcher that follows something that moves by itself (a hand, a
-/// door) first, can end up with that and little else: when far fewer features matched than should
-/// have, RANSAC, which sees all matches at once, is asked too, and the larger consensus counts.
+/// Asks another matcher, one that sees all matches at once; the larger consensus counts if its
+/// joint squared distance (0 where the matcher has none) is at most `chi2_per_degree`.
+bool Tracker::Implementation::askToo(Matcher& matcher, double chi2_per_degree, const cv::Mat& image,
+                                     TrackedFrame* frame) {
+  second_search_.beginFrame(image, templates_);
+  MatchResult second = matcher.match(prior_, second_search_, options_.matching);
+  MatchStatistics& first = frame->matching.statistics;
+  const double both_ms = second.statistics.total_ms + first.total_ms;
+  const bool is_better =
+      second.statistics.matched >= first.matched &&
+      second.statistics.mahalanobis2 <= 2.0 * second.statistics.matched * chi2_per_degree;
+  if (is_better) {
+    second.statistics.pixels_searched += first.pixels_searched;
+    frame->matching = std::move(second);
+    std::swap(search_, second_search_);  // match indices belong to the search that found them
+  }
+  frame->matching.statistics.total_ms = both_ms;
+  return is_better;
+}
+
+/// Asks the matcher, and another when far fewer features matched than should have. Where structure
+/// repeats in gates as wide as the image, a sequential matcher can lose the true hypothesis among
+/// hundreds of equals while all are still short: JCBB, which asks for the longest, is asked. Since
+/// that pairs whatever its test lets pass, it counts only if it agrees far better than it must. And
+/// a sequential matcher that follows something that moves by itself (a hand, a door) first, can end
+/// up with that and little else: RANSAC is asked.
 void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   frame->matching = matcher_->match(prior_, search_, options_.matching);
   if (!options_.second_opinion) return;
   const double expected = map_.expectedMatches(candidates_);
   const int matched = frame->matching.statistics.matched;
-  if (expected < 8.0 || matched > kPoorShare * expected) return;
-  second_search_.beginFrame(image, templates_);
-  MatchResult second = second_matcher_->match(prior_, second_search_, options_.matching);
-  const double both_ms = second.statistics.total_ms + frame->matching.statistics.total_ms;
-  if (second.statistics.matched >= matched) {
-    second.statistics.pixels_searched += frame->matching.statistics.pixels_searched;
-    frame->matching = std::move(second);
-    std::swap(search_, second_search_);  // match indices belong to the search that found them
-  }
-  frame->matching.statistics.total_ms = both_ms;
+  if (expected < 8.0) return;
+  if (frame->matching.statistics.ambiguous && matched <= kPoorShareWhenAmbiguous * expected &&
+      askToo(*longest_matcher_, kCloseChi2PerDegree, image, frame))
+    return;
+  if (matched <= kPoorShare * expected) askToo(*consensus_matcher_, 0.0, image, frame);
 }
 
 /// Fuses the accepted matches.

@@ -109,6 +109,18 @@ TEST_F(RecordedSequences, ActiveMatchingKeepsTheCheckerboardAtFifteenHertz) {
   EXPECT_LE(errorMm(run, "uzh_vamr_checkerboard", AlignmentKind::kSimilarity), 6.0);
 }
 
+TEST_F(RecordedSequences, ActiveMatchingKeepsTheCheckerboardAtSevenAndAHalfHertz) {
+  // The gates are as wide as the image, and the board's corners all look alike in them.
+  const TrackedRun run = trackAll("uzh_vamr_checkerboard", 4, withMatcher("active"), false);
+  EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+  EXPECT_LE(errorMm(run, "uzh_vamr_checkerboard", AlignmentKind::kSimilarity), 6.0);
+}
+
+TEST_F(RecordedSequences, PlainActiveSearchLosesTheCheckerboardAtSevenAndAHalfHertz) {
+  const TrackedRun run = trackAll("uzh_vamr_checkerboard", 4, withMatcher("active_search"), false);
+  EXPECT_LT(static_cast<int>(run.tracked.size()), run.frames);
+}
+
 TEST_F(RecordedSequences, MoreFeaturesHelp) {
   std::vector<double> errors;
   for (const int features : {11, 40, 100}) {

@@ -118,6 +118,11 @@ TEST_P(EveryMatcher, BoundsItsWorkAmongThousandsOfSpuriousMatches) {
   EXPECT_GT(result.statistics.matches_met, 300);
   EXPECT_LE(result.hypotheses.size(), 16u);
   EXPECT_LT(result.statistics.nodes, 40000);
+  // The statistics say so where a bound ended the work early.
+  const std::string& ran = result.statistics.matcher;
+  if (ran != "active_search" && ran != "one_point_ransac") {
+    EXPECT_TRUE(result.statistics.cut_short);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Names, EveryMatcher, testing::ValuesIn(matcherNames()));
@@ -212,6 +217,14 @@ TEST(ActiveMatcher, AfterTheLatchEvaluatesNothingAndLosesNoMatch) {
     }
   }
   EXPECT_LE(latched_steps, steps);
+}
+
+TEST(AutoMatcher, TakesActiveForFewFeaturesWhateverTheClutter) {
+  // The tree would cost as much there, and be wrong more often.
+  MatchOptions options;
+  options.max_gaussians = 16;
+  options.max_pixels = 20000;
+  EXPECT_EQ("active", matchWith("auto", problemOf(60, 1e-2), options).statistics.matcher);
 }
 
 TEST(AutoMatcher, TakesActiveForFewFeaturesAndChowLiuForMany) {

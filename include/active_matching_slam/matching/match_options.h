@@ -36,7 +36,8 @@ struct MatchOptions {
   std::int64_t max_pixels = 0;    ///< distinct pixels searched; 0: no limit
   double max_milliseconds = 0.0;  ///< 0: no limit
   /// auto: active is taken while its modelled cost is below this (and below max_milliseconds, if
-  /// set), else chow_liu. The model counts features and expected matches; no clock decides.
+  /// set), and beyond if chow_liu would not halve it, as with less than about 130 features. The
+  /// model counts features and expected matches; no clock decides.
   double auto_milliseconds = 10.0;
   /// Monotonic clock of the budget and of the reported durations, in seconds; empty: steady_clock.
   std::function<double()> clock_s;

@@ -1,0 +1,68 @@
+// Repeated structure at a low frame rate, in simulation: the corners of a checkerboard all look
+// alike, and the gates hold many of them.
+
+#include <gtest/gtest.h>
+
+#include "active_matching_slam/evaluation/trajectory_error.h"
+#include "active_matching_slam/simulation/simulator.h"
+#include "active_matching_slam/tracker/tracker.h"
+
+namespace active_matching_slam {
+namespace {
+
+struct BoardRun {
+  int frames = 0, tracked = 0;
+  double error_of_path = 0.0;  ///< absolute trajectory error over the length of the path
+};
+
+BoardRun trackCheckerboard(const std::string& matcher, double rate_hz) {
+  SimulatorOptions simulation;
+  simulation.scene = "checkerboard";
+  simulation.width = 320;
+  simulation.height = 240;
+  simulation.rate_hz = rate_hz;
+  simulation.duration_s = 10.0;
+  Simulator simulator(simulation);
+  TrackerOptions options;
+  options.matcher = matcher;
+  Tracker tracker(simulator.camera(), options);
+  Trajectory tracked, truth;
+  BoardRun run;
+  while (const auto image = simulator.next()) {
+    const auto frame = tracker.track(image->image, image->stamp_s);
+    ++run.frames;
+    truth.push_back({image->stamp_s, image->truth.T_world_camera});
+    if (frame->state == TrackingState::kTracking)
+      tracked.push_back({image->stamp_s, frame->camera.poseWorldCamera()});
+  }
+  run.tracked = static_cast<int>(tracked.size());
+  const auto pairs = pairPoses(tracked, truth);
+  const auto alignment = align(pairs, AlignmentKind::kSimilarity);
+  const double path = measureExcursion(truth).path_length;
+  run.error_of_path = alignment ? absoluteTrajectoryError(pairs, *alignment) / path : 1.0;
+  return run;
+}
+
+class SimulatedRepetition : public testing::TestWithParam<double> {};
+
+TEST_P(SimulatedRepetition, ActiveMatchingKeepsTheCheckerboardThatOthersLose) {
+  const BoardRun active = trackCheckerboard("active", GetParam());
+  EXPECT_EQ(active.tracked, active.frames);
+  EXPECT_LT(active.error_of_path, 0.005);
+  for (const char* matcher : {"active_search", "one_point_ransac"}) {
+    const BoardRun other = trackCheckerboard(matcher, GetParam());
+    EXPECT_TRUE(other.tracked < other.frames || other.error_of_path > 0.03) << matcher;
+  }
+}
+
+TEST_P(SimulatedRepetition, ActiveMatchingIsAsAccurateAsJcbb) {
+  const BoardRun active = trackCheckerboard("active", GetParam());
+  const BoardRun jcbb = trackCheckerboard("jcbb", GetParam());
+  EXPECT_GE(active.tracked, jcbb.tracked);
+  EXPECT_LT(active.error_of_path, 1.5 * jcbb.error_of_path);
+}
+
+INSTANTIATE_TEST_SUITE_P(Hertz, SimulatedRepetition, testing::Values(15.0));
+
+}  // namespace
+}  // namespace active_matching_slam
