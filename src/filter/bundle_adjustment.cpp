@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kCostOfInvisible = 1e3;  ///< of an image point whose feature does not project
 constexpr double kLeastGain = 1e-4;       ///< relative fall of the cost that is worth a step more
+/// Of every bearing [1/rad^2]: one that no image shows stays as it is.
+constexpr double kLeastInformation = 1e-2;
 
 using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
@@ -20,15 +22,11 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 /// Least squares over (cameras but the first, 6 each; features, 3 each) about the present state.
 struct NormalEquations {
   double cost = 0.0;
-  Eigen::MatrixXd cameras;                         ///< 6K x 6K, block diagonal
-  Eigen::VectorXd camera_gradient;                 ///< 6K
-  std::vector<Eigen::Matrix3d> features;           ///< F blocks
-  std::vector<Eigen::Vector3d> feature_gradients;  ///< F
-  struct Cross {
-    int camera;  ///< less the first
-    Eigen::Matrix<double, 6, 3> block;
-  };
-  std::vector<std::vector<Cross>> cross;  ///< by feature
+  Eigen::MatrixXd cameras;                ///< 6K x 6K, block diagonal
+  Eigen::VectorXd camera_gradient;        ///< 6K
+  std::vector<Eigen::Matrix3d> features;  ///< F blocks
+  Eigen::VectorXd feature_gradient;       ///< 3F
+  Eigen::MatrixXd cross;                  ///< 6K x 3F, cameras by features
 };
 
 /// Cauchy's function of a squared residual [px^2], in units of the noise: what is far off counts
@@ -65,18 +63,18 @@ double bundleCost(const CameraModel& model, const BundleOptions& options, const 
 NormalEquations linearise(const CameraModel& model, const BundleOptions& options,
                           const Bundle& bundle) {
   const int K = static_cast<int>(bundle.cameras.size()) - 1;
-  const std::size_t F = bundle.features.size();
+  const int F = static_cast<int>(bundle.features.size());
   NormalEquations N;
   N.cameras = Eigen::MatrixXd::Zero(6 * K, 6 * K);
   N.camera_gradient = Eigen::VectorXd::Zero(6 * K);
-  N.features.assign(F, Eigen::Matrix3d::Zero());
-  N.feature_gradients.assign(F, Eigen::Vector3d::Zero());
-  N.cross.resize(F);
-  for (std::size_t i = 0; i < F; ++i) {
+  N.features.assign(F, Eigen::Vector3d(kLeastInformation, kLeastInformation, 0.0).asDiagonal());
+  N.feature_gradient = Eigen::VectorXd::Zero(3 * F);
+  N.cross = Eigen::MatrixXd::Zero(6 * K, 3 * F);
+  for (int i = 0; i < F; ++i) {
     const double weight = 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
     const double error = options.inverse_depth - bundle.features[i].inverse_depth;
     N.features[i](2, 2) += weight;
-    N.feature_gradients[i][2] += weight * error;
+    N.feature_gradient[3 * i + 2] += weight * error;
     N.cost += weight * error * error;
   }
   for (int k = 0; k <= K; ++k) {
@@ -91,12 +89,12 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
       N.cost += robustCost(options, residual.squaredNorm());
       const Matrix23 J = projection->d_feature.rightCols<3>();
       N.features[o.feature] += weight * J.transpose() * J;
-      N.feature_gradients[o.feature] += weight * J.transpose() * residual;
+      N.feature_gradient.segment<3>(3 * o.feature) += weight * J.transpose() * residual;
       if (k == 0) continue;
       const Matrix26& C = projection->d_camera;
       N.cameras.block<6, 6>(6 * (k - 1), 6 * (k - 1)) += weight * C.transpose() * C;
       N.camera_gradient.segment<6>(6 * (k - 1)) += weight * C.transpose() * residual;
-      N.cross[o.feature].push_back({k - 1, weight * C.transpose() * J});
+      N.cross.block<6, 3>(6 * (k - 1), 3 * o.feature) = weight * C.transpose() * J;
     }
   }
   return N;
@@ -104,39 +102,37 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
 
 /// Solves for the step with the diagonal grown by `damping`. False when not positive definite.
 bool solveStep(const NormalEquations& N, double damping, Eigen::VectorXd* cameras,
-               std::vector<Eigen::Vector3d>* features) {
+               Eigen::VectorXd* features) {
   Eigen::MatrixXd S = N.cameras;
   S.diagonal() *= 1.0 + damping;
-  Eigen::VectorXd g = N.camera_gradient;
-  std::vector<Eigen::Matrix3d> inverses(N.features.size());
+  std::vector<Eigen::Matrix3d> inverse_roots;  // L^-1 of each, where H = L L^T is its block
+  Eigen::MatrixXd reduced(N.cross.rows(), N.cross.cols());  // W L^-T
+  Eigen::VectorXd g(N.feature_gradient.size());             // L^-1 g
   for (std::size_t i = 0; i < N.features.size(); ++i) {
     Eigen::Matrix3d H = N.features[i];
     H.diagonal() *= 1.0 + damping;
-    inverses[i] = H.inverse();
-    if (!inverses[i].allFinite()) return false;
-    for (const auto& a : N.cross[i]) {
-      const Eigen::Matrix<double, 6, 3> reduced = a.block * inverses[i];
-      g.segment<6>(6 * a.camera) -= reduced * N.feature_gradients[i];
-      for (const auto& b : N.cross[i])
-        if (b.camera <= a.camera)
-          S.block<6, 6>(6 * a.camera, 6 * b.camera) -= reduced.lazyProduct(b.block.transpose());
-    }
+    const Eigen::LLT<Eigen::Matrix3d> root(H);
+    if (root.info() != Eigen::Success) return false;
+    inverse_roots.push_back(root.matrixL().solve(Eigen::Matrix3d::Identity()));
+    const auto column = static_cast<Eigen::Index>(3 * i);
+    reduced.middleCols<3>(column).noalias() =
+        N.cross.middleCols<3>(column).lazyProduct(inverse_roots[i].transpose());
+    g.segment<3>(column) = inverse_roots[i] * N.feature_gradient.segment<3>(column);
   }
+  S.selfadjointView<Eigen::Lower>().rankUpdate(reduced, -1.0);
   const Eigen::LLT<Eigen::MatrixXd> factor(S);  // reads the lower triangle
   if (factor.info() != Eigen::Success) return false;
-  *cameras = factor.solve(g);
-  features->resize(N.features.size());
+  *cameras = factor.solve(N.camera_gradient - reduced * g);
+  *features = g - reduced.transpose() * *cameras;
   for (std::size_t i = 0; i < N.features.size(); ++i) {
-    Eigen::Vector3d gradient = N.feature_gradients[i];
-    for (const auto& a : N.cross[i])
-      gradient -= a.block.transpose() * cameras->segment<6>(6 * a.camera);
-    (*features)[i] = inverses[i] * gradient;
+    auto step = features->segment<3>(static_cast<Eigen::Index>(3 * i));
+    step = (inverse_roots[i].transpose() * step).eval();
   }
-  return cameras->allFinite();
+  return cameras->allFinite() && features->allFinite();
 }
 
 void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
-               const std::vector<Eigen::Vector3d>& features, Bundle* bundle) {
+               const Eigen::VectorXd& features, Bundle* bundle) {
   for (std::size_t k = 1; k < bundle->cameras.size(); ++k) {
     CameraState& camera = bundle->cameras[k];
     const auto step = cameras.segment<6>(6 * static_cast<Eigen::Index>(k - 1));
@@ -144,16 +140,17 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
     camera.q_world_camera =
         (rotationFromVector(step.tail<3>()) * camera.q_world_camera).normalized();
   }
-  for (std::size_t i = 0; i < features.size(); ++i) {
+  for (std::size_t i = 0; i < bundle->features.size(); ++i) {
     FeatureState& feature = bundle->features[i];
-    const Eigen::Vector3d direction = feature.tangentBasis() * features[i].head<2>();
+    const auto step = features.segment<3>(static_cast<Eigen::Index>(3 * i));
+    const Eigen::Vector3d direction = feature.tangentBasis() * step.head<2>();
     const Eigen::Quaterniond turn = rotationFromVector(feature.bearing_world.cross(direction));
     feature.bearing_world = (turn * feature.bearing_world).normalized();
     const Eigen::Vector3d tangent = turn * feature.tangent_world;
     feature.tangent_world =
         (tangent - feature.bearing_world * feature.bearing_world.dot(tangent)).normalized();
     feature.inverse_depth =
-        std::max(feature.inverse_depth + features[i][2], options.minimum_inverse_depth);
+        std::max(feature.inverse_depth + step[2], options.minimum_inverse_depth);
   }
 }
 
@@ -162,8 +159,7 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
 double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle) {
   double damping = 1e-3;
   NormalEquations N = linearise(model, options, *bundle);
-  Eigen::VectorXd camera_step;
-  std::vector<Eigen::Vector3d> feature_steps;
+  Eigen::VectorXd camera_step, feature_steps;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     double cost = N.cost;
     Bundle trial;
@@ -181,7 +177,8 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
     *bundle = std::move(trial);
     const double gain = N.cost - cost;
     N = linearise(model, options, *bundle);
-    if (gain < kLeastGain * N.cost) break;
+    const int left = options.max_iterations - 1 - iteration;
+    if (gain < kLeastGain * N.cost || N.cost - left * gain > options.hopeless_cost) break;
   }
   return N.cost;
 }
@@ -194,11 +191,11 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   const int F = static_cast<int>(N.features.size());
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(cameras + 3 * F, cameras + 3 * F);
   information.topLeftCorner(cameras, cameras) = N.cameras;
+  information.bottomLeftCorner(3 * F, cameras) = N.cross.transpose();
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(cameras + 3 * F);
   for (int i = 0; i < F; ++i) {
     const int o = cameras + 3 * i;
     information.block<3, 3>(o, o) = N.features[i];
-    for (const auto& c : N.cross[i]) information.block<3, 6>(o, 6 * c.camera) = c.block.transpose();
     scale[o + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
   }
   information += scale * scale.transpose() / (relative_scale_sigma * relative_scale_sigma);

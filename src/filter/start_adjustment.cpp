@@ -1,5 +1,6 @@
 #include "active_matching_slam/filter/start_adjustment.h"
 
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -286,13 +287,15 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   std::vector<Bundle> readings(2, someImages(rest));
   flatten(model, options.inverse_depth, &readings[1]);
   std::vector<double> costs;
+  BundleOptions telling = options;
   for (std::size_t i = 0; i < 4; ++i) {
     if (i >= 2) {
       if (i == 3 && isSameReading(readings[0], readings[1])) break;
       readings.push_back(readings[i - 2]);
       reverseDepths(model, &readings.back());
     }
-    costs.push_back(adjustBundle(model, options, &readings[i]));
+    costs.push_back(adjustBundle(model, telling, &readings[i]));
+    telling.hopeless_cost = std::min(telling.hopeless_cost, costs.back() + kLeastCostGap);
   }
   const auto best =
       static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
@@ -352,23 +355,30 @@ std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model
   const int F = static_cast<int>(ids.size());
   const int size = CameraError::kSize + 6 * F;
   // Rows: the filter's error; columns: cameras before last and last, then the features.
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(size, joint.cols());
+  Eigen::SparseMatrix<double> J(size, joint.cols());
+  J.reserve(Eigen::VectorXi::Constant(static_cast<int>(joint.cols()), 4));
+  const auto setBlock = [&J](int row, int column, const Eigen::Matrix3d& block) {
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r)
+        if (block(r, c) != 0.0) J.insert(row + r, column + c) = block(r, c);
+  };
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
   const Eigen::Matrix3d R_camera_world = start.camera.q_world_camera.toRotationMatrix().transpose();
-  J.block<3, 3>(CameraError::kPosition, 6) = I;
-  J.block<3, 3>(CameraError::kRotation, 9) = I;
-  J.block<3, 3>(CameraError::kVelocity, 0) = -I / dt;
-  J.block<3, 3>(CameraError::kVelocity, 6) = I / dt;
-  J.block<3, 3>(CameraError::kAngularVelocity, 3) = -R_camera_world / dt;
-  J.block<3, 3>(CameraError::kAngularVelocity, 9) = R_camera_world / dt;
+  setBlock(CameraError::kPosition, 6, I);
+  setBlock(CameraError::kRotation, 9, I);
+  setBlock(CameraError::kVelocity, 0, -I / dt);
+  setBlock(CameraError::kVelocity, 6, I / dt);
+  setBlock(CameraError::kAngularVelocity, 3, -R_camera_world / dt);
+  setBlock(CameraError::kAngularVelocity, 9, R_camera_world / dt);
   for (int i = 0; i < F; ++i) {
     FeatureState feature = bundle.features[i];
     feature.id = ids[i];
     feature.offset = CameraError::kSize + 6 * i;
-    J.block<3, 3>(feature.offset + FeatureError::kBearing, 12 + 3 * i) = I;
+    setBlock(feature.offset + FeatureError::kBearing, 12 + 3 * i, I);
     start.features.push_back(feature);
   }
-  start.covariance = J * joint * J.transpose();
+  const Eigen::MatrixXd rows = J * joint;
+  start.covariance = rows * J.transpose();
   start.covariance = 0.5 * (start.covariance + start.covariance.transpose()).eval();
   const FilterOptions& noise = filter.options();
   start.covariance.diagonal().segment<3>(CameraError::kVelocity).array() +=

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 #include "active_matching_slam/camera/camera_model.h"
@@ -30,6 +31,8 @@ struct BundleOptions {
   double sigma_inverse_depth = 0.5;  ///< and its standard deviation
   double minimum_inverse_depth = 1e-4;
   int max_iterations = 20;
+  /// Ends where steps like the last, as many as are left, would not bring the cost below.
+  double hopeless_cost = std::numeric_limits<double>::infinity();
 };
 
 /// Levenberg-Marquardt over all cameras but the first, all bearings and inverse depths, the
