@@ -14,8 +14,8 @@ namespace {
 /// no more beyond.
 constexpr double kFirstParallaxPx = 0.5, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
 constexpr double kGrowthInDoubt = 1.25;    ///< the factor when the images leave a doubt
-constexpr std::size_t kFewImages = 12;     ///< that tell the readings of the images apart
-constexpr std::size_t kMostImages = 48;    ///< kept
+constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
+constexpr std::size_t kMostImages = 24;    ///< kept
 constexpr std::size_t kLeastPoints = 8;    ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;         ///< of a feature that takes part
 constexpr double kLeastCostGap = 12.0;     ///< to the next reading; odds of e^6

@@ -8,7 +8,7 @@ MatchResult ActiveSearchMatcher::match(const MeasurementPrior& given, FeatureSea
   const ProperPrior prior(given);
   SearchLedger ledger(prior, search, options);
   MatchResult result = ledger.begin("active_search");
-  const auto gates = searchFullGates(prior, ledger);
+  const auto gates = searchFullGates(prior, ledger, &result.statistics.cut_short);
   for (int f = 0; f < prior.size(); ++f)
     result.match_of_feature[static_cast<std::size_t>(prior.original(f))] =
         bestScore(ledger.matches(f), gates[static_cast<std::size_t>(f)]);

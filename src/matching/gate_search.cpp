@@ -1,11 +1,27 @@
 #include "gate_search.h"
 
+#include <Eigen/LU>
+#include <algorithm>
+#include <numeric>
+
 namespace active_matching_slam {
 
-std::vector<std::vector<int>> searchFullGates(const ProperPrior& prior, SearchLedger& ledger) {
-  std::vector<std::vector<int>> gates;
-  for (int f = 0; f < prior.size(); ++f)
-    gates.push_back(ledger.search(f, {prior.mean(f), prior.covariance(f)}).matches);
+std::vector<std::vector<int>> searchFullGates(const ProperPrior& prior, SearchLedger& ledger,
+                                              bool* cut_short) {
+  std::vector<int> order(static_cast<std::size_t>(prior.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&prior](int a, int b) {
+    return prior.covariance(a).determinant() < prior.covariance(b).determinant();
+  });
+  std::vector<std::vector<int>> gates(order.size());
+  for (const int f : order) {
+    if (ledger.isOverBudget()) {
+      *cut_short = true;
+      break;
+    }
+    gates[static_cast<std::size_t>(f)] =
+        ledger.search(f, {prior.mean(f), prior.covariance(f)}).matches;
+  }
   return gates;
 }
 

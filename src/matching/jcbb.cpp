@@ -122,7 +122,8 @@ class BranchAndBound {
   void visit(int feature, int depth, double distance2) {
     if (!canBeat(feature, depth, distance2)) return;
     // Out of budget, a branch that already pairs more than the best leaf is the better answer.
-    const bool stop = isOutOfBudget();
+    // The first leaf is always reached.
+    const bool stop = best_pairings_ >= 0 && isOutOfBudget();
     if (stop && depth <= best_pairings_) return;
     if (stop || feature == size_) {
       best_ = assigned_;
@@ -162,7 +163,7 @@ MatchResult JcbbMatcher::match(const MeasurementPrior& given, FeatureSearch& sea
   const ProperPrior prior(given);
   SearchLedger ledger(prior, search, options);
   MatchResult result = ledger.begin("jcbb");
-  const auto gates = searchFullGates(prior, ledger);
+  const auto gates = searchFullGates(prior, ledger, &result.statistics.cut_short);
   BranchAndBound branch_and_bound(prior, ledger, gates, options);
   branch_and_bound.run();
   for (int f = 0; f < prior.size(); ++f)
@@ -170,7 +171,7 @@ MatchResult JcbbMatcher::match(const MeasurementPrior& given, FeatureSearch& sea
         branch_and_bound.best()[static_cast<std::size_t>(f)];
   result.statistics.nodes = branch_and_bound.nodes();
   result.statistics.mahalanobis2 = branch_and_bound.bestDistance2();
-  result.statistics.cut_short = branch_and_bound.cutShort();
+  result.statistics.cut_short |= branch_and_bound.cutShort();
   ledger.finish(result);
   return result;
 }

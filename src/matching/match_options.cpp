@@ -24,6 +24,8 @@ void checkMatchOptions(const MatchOptions& o) {
           o.default_rates.false_positive, "(0, 1)");
   require(o.prune_weight >= 0.0 && o.prune_weight < 1.0, "prune_weight", o.prune_weight, "[0, 1)");
   require(o.max_gaussians >= 0, "max_gaussians", o.max_gaussians, "[0, inf)");
+  require(o.merge_sigmas >= 0.0, "merge_sigmas", o.merge_sigmas, "[0, inf)");
+  require(o.merge_share >= 0.0 && o.merge_share <= 1.0, "merge_share", o.merge_share, "[0, 1]");
   require(o.latch_information_bits >= 0.0, "latch_information_bits", o.latch_information_bits,
           "[0, inf)");
   require(o.finish_weight >= 0.0 && o.finish_weight <= 1.0, "finish_weight", o.finish_weight,

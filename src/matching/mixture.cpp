@@ -16,12 +16,17 @@ std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
                  std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
-    : joint_(joint), ledger_(ledger), options_(options), likelihoods_(std::move(likelihoods)) {
+    : joint_(joint),
+      ledger_(ledger),
+      options_(options),
+      likelihoods_(std::move(likelihoods)),
+      limit_(options.max_gaussians) {
   Hypothesis root;
   const std::size_t size = slot(joint.size());
   root.joint = joint.prior();
   root.mean.resize(size);
   root.match.assign(size, -1);
+  root.share.assign(size, 1.0);
   root.lineage.assign(size, -1);
   root.candidate_of.assign(size, -1);
   root.entry.assign(size, PairTable::kNone);
@@ -171,12 +176,14 @@ void Mixture::addCandidate(Hypothesis& h, int f) const {
   h.candidates.push_back(candidate);
 }
 
-Hypothesis Mixture::spawn(const Hypothesis& parent, int f, int match) {
+Hypothesis Mixture::spawn(const Hypothesis& parent, int f, const Child& born) {
+  const int match = born.match;
   Hypothesis child;
   child.parent = parent.id;
   child.joint = joint_.measure(parent.joint, f);
   child.mean = parent.mean;
   child.match = parent.match;
+  child.share = parent.share;
   child.lineage = parent.lineage;
   const Eigen::Vector2d found = ledger_.matches(f)[slot(match)].pixel;
   const Eigen::Vector2d weighted =
@@ -186,6 +193,7 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, int match) {
     child.mean[slot(touched[i])].noalias() += child.joint->cross(i) * weighted;
   child.mean[slot(f)] = found;
   child.match[slot(f)] = match;
+  child.share[slot(f)] = born.share;
   std::vector<char> is_changed(child.mean.size(), 0);
   is_changed[slot(f)] = 1;
   for (const int t : touched) is_changed[slot(t)] = 1;
@@ -256,7 +264,7 @@ SearchOutcome Mixture::searchOnly(int g, int c) {
 
 void Mixture::fuse(int g, int f, int match) {
   Hypothesis& h = hypotheses_[slot(g)];
-  Hypothesis fused = spawn(h, f, match);
+  Hypothesis fused = spawn(h, f, {match, h.log_weight});
   fused.id = h.id;
   fused.parent = h.parent;
   fused.log_weight = h.log_weight;

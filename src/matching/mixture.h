@@ -56,6 +56,7 @@ struct Hypothesis {
   std::shared_ptr<const Conditional> joint;
   std::vector<Eigen::Vector2d> mean;    ///< F, the match for a fused feature [px]
   std::vector<int> match;               ///< F, -1: not fused
+  std::vector<double> share;            ///< F, of the match among those merged with it
   std::vector<int> lineage;             ///< F, newest ellipse searched, in Mixture's pool; -1: none
   std::vector<Candidate> candidates;    ///< by feature, as they were at birth
   std::vector<int> candidate_of;        ///< F, index into candidates; -1: none
@@ -102,6 +103,9 @@ class Mixture {
   /// is known but outside the ellipses that g or its ancestors searched.
   bool isSterile(int g, int c);
 
+  /// At most so many are kept from the next update on; 0: no limit.
+  void setLimit(int gaussians) { limit_ = gaussians; }
+
   /// Searches candidate c of hypothesis g and updates the mixture. `step` gets what came of it.
   void searchAndUpdate(int g, int c, MatchStep& step);
   /// Fuses a match of feature f into g without asking the others; g keeps its id and weight.
@@ -120,6 +124,7 @@ class Mixture {
   struct Child {
     int match;
     double log_weight;
+    double share = 1.0;  ///< of its own in log_weight
   };
 
   bool liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const;
@@ -129,8 +134,9 @@ class Mixture {
   double explained(Hypothesis& h, int f);
   void updateIncremental(int g, int c, MatchStep& step, std::vector<Child>& children);
   void updateThesis(int g, int c, MatchStep& step, std::vector<Child>& children);
-  void reweigh(int g, int f, const std::vector<Child>& children, MatchStep& step);
-  Hypothesis spawn(const Hypothesis& parent, int f, int match);
+  void reweigh(int g, int f, std::vector<Child>& children, MatchStep& step);
+  void mergeSiblings(int g, int f, std::vector<Child>& children) const;
+  Hypothesis spawn(const Hypothesis& parent, int f, const Child& child);
   /// Entries of a newborn in the tables of pairs; its parent's where `is_changed` is 0.
   void takeEntries(Hypothesis& child, const Hypothesis& parent, int f,
                    const std::vector<char>& is_changed);
@@ -157,6 +163,7 @@ class Mixture {
   PairTerm scratch_;  // of a Gaussian without an entry
   int next_id_ = 1;
   int most_gaussians_ = 1;
+  int limit_;
   bool was_capped_ = false;
 };
 

@@ -9,6 +9,15 @@ namespace {
 
 /// Hypotheses of an ambiguous frame that together weigh as much are the strong ones.
 constexpr double kStrongShare = 0.9;
+/// With a budget of time, a mixture beyond so many pairs of Gaussians and features draws its
+/// candidates.
+constexpr std::size_t kMostEvaluations = 4000;
+/// Share of the budget after which the run hurries: no more mutual information, few Gaussians, and
+/// the rest of the features as Fast Active Matching does it once one Gaussian dominates.
+constexpr double kBudgetForChoice = 0.35;
+constexpr int kGaussiansInHurry = 8;
+/// Share after which it goes on with the heaviest Gaussian whether it dominates or not.
+constexpr double kBudgetForDoubt = 0.7;
 
 std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
@@ -48,12 +57,16 @@ void MixtureRun::run(MatchResult& result) {
   double information_s = 0.0;
   const double start = ledger_.now();
   while (!isFinished()) {
-    if (ledger_.isOverBudget()) {
-      statistics.cut_short = true;
-      break;
+    if (ledger_.isOverBudget()) break;
+    if (!hurries_ && ledger_.budgetUsed() >= kBudgetForChoice) {
+      statistics.cut_short = hurries_ = true;
+      if (!latched_) latch();
+      mixture_.setLimit(kGaussiansInHurry);
     }
-    if (policy_ == Policy::kFast && latched_ &&
-        mixture_.hypotheses()[slot(mixture_.heaviest())].weight > options_.fast_accept_weight) {
+    const double weight = mixture_.hypotheses()[slot(mixture_.heaviest())].weight;
+    if ((latched_ && (policy_ == Policy::kFast || hurries_) &&
+         weight > options_.fast_accept_weight) ||
+        ledger_.budgetUsed() >= kBudgetForDoubt) {
       acceptNearest(result);
       break;
     }
@@ -86,7 +99,14 @@ Measurement MixtureRun::choose() {
     if (next.exists() && most_bits < options_.fast_latch_bits) latch();
     return next;
   }
-  const Measurement next = choice_.best();
+  // With a budget of time, a large mixture's candidates are drawn as FAM draws them: each
+  // evaluation asks every Gaussian.
+  const std::size_t gaussians = mixture_.hypotheses().size();
+  double most_bits = 0.0;
+  const bool draws = options_.max_milliseconds > 0.0 &&
+                     gaussians * gaussians * slot(prior_.size()) > kMostEvaluations;
+  const Measurement next =
+      draws ? choice_.bestOfDrawn(options_.fast_candidates, random_, most_bits) : choice_.best();
   if (!next.exists() || next.expected.bits() >= options_.latch_information_bits) return next;
   if (options_.latch_information_bits <= 0.0) return next;
   latch();
@@ -98,8 +118,10 @@ void MixtureRun::latch() {
   mixture_.forgetTerms();
 }
 
-/// The heaviest Gaussian's lowest candidate; FAM goes on to the next heaviest when it has none.
+/// The heaviest Gaussian's lowest candidate, in a hurry its smallest; FAM goes on to the next
+/// heaviest when it has none.
 Measurement MixtureRun::chooseAfterLatch() {
+  if (hurries_) return choice_.smallestOf(mixture_.heaviest());
   if (policy_ == Policy::kFull) return choice_.firstOf(mixture_.heaviest());
   std::vector<int> order;
   for (int k = 0; k < static_cast<int>(mixture_.hypotheses().size()); ++k) order.push_back(k);
@@ -113,12 +135,11 @@ Measurement MixtureRun::chooseAfterLatch() {
   return {};
 }
 
-/// FAM: a dominant Gaussian after the latch takes the match nearest to each prediction that is
-/// left.
+/// A dominant Gaussian after the latch takes the match nearest to each prediction that is left.
 void MixtureRun::acceptNearest(MatchResult& result) {
   const int dominant = mixture_.heaviest();
   while (true) {
-    const Measurement next = choice_.firstOf(dominant);
+    const Measurement next = hurries_ ? choice_.smallestOf(dominant) : choice_.firstOf(dominant);
     if (!next.exists()) return;
     if (ledger_.isOverBudget()) {
       result.statistics.cut_short = true;
@@ -170,7 +191,9 @@ void MixtureRun::record(MatchStep step, MatchResult& result) const {
 
 std::vector<int> MixtureRun::matchesOf(const Hypothesis& h) const {
   std::vector<int> matches(slot(prior_.size() + prior_.leftOut()), -1);
-  for (int f = 0; f < prior_.size(); ++f) matches[slot(prior_.original(f))] = h.match[slot(f)];
+  for (int f = 0; f < prior_.size(); ++f)
+    if (h.share[slot(f)] >= options_.merge_share)
+      matches[slot(prior_.original(f))] = h.match[slot(f)];
   return matches;
 }
 
@@ -180,23 +203,33 @@ void MixtureRun::report(MatchResult& result) const {
   statistics.max_gaussians = mixture_.mostGaussians();
   statistics.information_bits_end = informationLeft(accepted);
   statistics.accepted_weight = accepted.weight;
-  for (const Hypothesis& h : mixture_.hypotheses())
-    result.hypotheses.push_back({h.id, h.parent, h.weight, matchesOf(h)});
-  std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(),
-                   [](const MatchHypothesis& a, const MatchHypothesis& b) {
-                     return a.probability > b.probability;
-                   });
+  std::vector<const Hypothesis*> ordered;
+  for (const Hypothesis& h : mixture_.hypotheses()) ordered.push_back(&h);
+  std::stable_sort(ordered.begin(), ordered.end(),
+                   [](const Hypothesis* a, const Hypothesis* b) { return a->weight > b->weight; });
+  for (const Hypothesis* h : ordered)
+    result.hypotheses.push_back({h->id, h->parent, h->weight, matchesOf(*h)});
   result.match_of_feature = result.hypotheses.front().match_of_feature;
   statistics.ambiguous = accepted.weight < options_.ambiguous_below_weight;
   if (!statistics.ambiguous) return;
   // Strong are the heaviest hypotheses that together are almost certain to hold the truth.
   double together = accepted.weight;
-  for (std::size_t k = 1; k < result.hypotheses.size() && together < kStrongShare; ++k) {
-    together += result.hypotheses[k].probability;
-    for (std::size_t f = 0; f < result.match_of_feature.size(); ++f)
-      if (result.hypotheses[k].match_of_feature[f] != result.match_of_feature[f])
-        result.match_of_feature[f] = -1;
+  for (std::size_t k = 1; k < ordered.size() && together < kStrongShare; ++k) {
+    together += ordered[k]->weight;
+    for (int f = 0; f < prior_.size(); ++f) {
+      int& match = result.match_of_feature[slot(prior_.original(f))];
+      if (match >= 0 && !agrees(*ordered[k], f, match)) match = -1;
+    }
   }
+}
+
+/// Whether `h` has accepted the match, or would find it where it has not looked yet.
+bool MixtureRun::agrees(const Hypothesis& h, int feature, int match) const {
+  const int c = h.candidate_of[slot(feature)];
+  if (h.isFused(feature) || c < 0 || !h.candidates[slot(c)].open)
+    return h.match[slot(feature)] == match;
+  return mahalanobisSquared(h.ellipse(feature), ledger_.matches(feature)[slot(match)].pixel) <=
+         kEllipseRadius2;
 }
 
 }  // namespace active_matching_slam

@@ -29,6 +29,7 @@ class MixtureRun {
   void latch();
   bool isFinished() const;
   void acceptNearest(MatchResult& result);
+  bool agrees(const Hypothesis& h, int feature, int match) const;
   MatchStep begin(const Measurement& measurement) const;
   void record(MatchStep step, MatchResult& result) const;
   void report(MatchResult& result) const;
@@ -42,6 +43,7 @@ class MixtureRun {
   MeasurementChoice choice_;
   std::mt19937_64 random_;
   bool latched_ = false;
+  bool hurries_ = false;  ///< to end within the budget
 };
 
 }  // namespace active_matching_slam

@@ -1,3 +1,4 @@
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,9 @@ namespace {
 
 /// Below this a likelihood is taken as this: a logarithm must stay finite.
 constexpr double kLeastLikelihood = 1e-9;
+/// Logarithm of the odds that the better of two near matches is the true one, by the difference of
+/// their similarities.
+constexpr double kScoreCredit = 20.0;
 
 std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
@@ -120,9 +124,56 @@ void Mixture::searchAndUpdate(int g, int c, MatchStep& step) {
   reweigh(g, f, children, step);
 }
 
+/// Joins children that expect nearly the same of all features left: they differ in no more than
+/// which of some near matches is this feature's. Otherwise k features with two near matches each
+/// would make 2^k Gaussians. Position can hardly tell such matches apart; similarity can.
+void Mixture::mergeSiblings(int g, int f, std::vector<Child>& children) const {
+  if (children.size() < 2 || !(options_.merge_sigmas > 0.0)) return;
+  const Hypothesis& parent = hypotheses_[slot(g)];
+  const auto joint = joint_.measure(parent.joint, f);
+  const std::vector<int>& touched = joint->touched();
+  std::vector<Eigen::Matrix2d> gains, precisions;
+  for (std::size_t i = 0; i < touched.size(); ++i) {
+    if (parent.isFused(touched[i]) || !(joint->marginal(touched[i]).determinant > 0.0)) continue;
+    gains.emplace_back(joint->cross(i) * joint->measuredPrecision());
+    precisions.emplace_back(joint->marginal(touched[i]).covariance.inverse());
+  }
+  const double limit = options_.merge_sigmas * options_.merge_sigmas;
+  const auto isNear = [&](const Child& a, const Child& b) {
+    const Eigen::Vector2d apart =
+        ledger_.matches(f)[slot(a.match)].pixel - ledger_.matches(f)[slot(b.match)].pixel;
+    for (std::size_t i = 0; i < gains.size(); ++i) {
+      const Eigen::Vector2d shift = gains[i] * apart;
+      if (shift.dot(precisions[i] * shift) > limit) return false;
+    }
+    return true;
+  };
+  const auto credit = [&](const Child& child) {
+    return child.log_weight + kScoreCredit * ledger_.matches(f)[slot(child.match)].score;
+  };
+  std::stable_sort(children.begin(), children.end(),
+                   [&](const Child& a, const Child& b) { return credit(a) > credit(b); });
+  std::vector<Child> kept;
+  std::vector<double> credits;
+  for (const Child& child : children) {
+    const auto near = std::find_if(kept.begin(), kept.end(),
+                                   [&](const Child& other) { return isNear(other, child); });
+    if (near == kept.end()) {
+      kept.push_back(child);
+      credits.push_back(credit(child));
+      continue;
+    }
+    const double best = credits[static_cast<std::size_t>(near - kept.begin())];
+    near->share = 1.0 / (1.0 / near->share + std::exp(credit(child) - best));
+    near->log_weight += std::log1p(std::exp(child.log_weight - near->log_weight));
+  }
+  children = std::move(kept);
+}
+
 /// Normalises, drops what is too light, and only then makes the children: thousands of spurious
 /// matches cost thousands of weights, not thousands of Gaussians.
-void Mixture::reweigh(int g, int f, const std::vector<Child>& children, MatchStep& step) {
+void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& step) {
+  mergeSiblings(g, f, children);
   struct Entry {
     int index;  ///< of a hypothesis, or of a child after them
     int id, parent;
@@ -157,7 +208,7 @@ void Mixture::reweigh(int g, int f, const std::vector<Child>& children, MatchSte
   double heaviest = 0.0;
   for (const Entry& e : entries) heaviest = std::max(heaviest, e.weight);
   double least = std::min(options_.prune_weight, heaviest);
-  const auto limit = slot(options_.max_gaussians);
+  const auto limit = slot(limit_);
   const auto dropLight = [&] {
     entries.erase(std::remove_if(entries.begin(), entries.end(),
                                  [&](const Entry& e) { return e.weight < least; }),
@@ -187,8 +238,7 @@ void Mixture::reweigh(int g, int f, const std::vector<Child>& children, MatchSte
   hypotheses_.reserve(hypotheses_.size() + entries.size());
   for (Entry& e : entries) {
     if (e.index < old_count) continue;
-    hypotheses_.push_back(
-        spawn(hypotheses_[slot(g)], f, children[slot(e.index - old_count)].match));
+    hypotheses_.push_back(spawn(hypotheses_[slot(g)], f, children[slot(e.index - old_count)]));
     e.index = static_cast<int>(hypotheses_.size()) - 1;
   }
   if (!lives[slot(g)]) releaseEntries(hypotheses_[slot(g)]);

@@ -107,7 +107,7 @@ MatchResult OnePointRansacMatcher::match(const MeasurementPrior& given, FeatureS
   const ProperPrior prior(given);
   SearchLedger ledger(prior, search, options);
   MatchResult result = ledger.begin("one_point_ransac");
-  const auto gates = searchFullGates(prior, ledger);
+  const auto gates = searchFullGates(prior, ledger, &result.statistics.cut_short);
   std::vector<int> best, voters;
   for (int f = 0; f < prior.size(); ++f) {
     best.push_back(bestScore(ledger.matches(f), gates[static_cast<std::size_t>(f)]));

@@ -1,5 +1,6 @@
 #include "search_ledger.h"
 
+#include <algorithm>
 #include <chrono>
 
 #include "active_matching_slam/matching/search_ellipse.h"
@@ -30,9 +31,13 @@ SearchOutcome SearchLedger::search(int feature, const SearchEllipse& ellipse) {
   return outcome;
 }
 
-bool SearchLedger::isOverBudget() const {
-  if (options_.max_pixels > 0 && pixels_ >= options_.max_pixels) return true;
-  return options_.max_milliseconds > 0.0 && elapsedMilliseconds() >= options_.max_milliseconds;
+double SearchLedger::budgetUsed() const {
+  double used = 0.0;
+  if (options_.max_pixels > 0)
+    used = static_cast<double>(pixels_) / static_cast<double>(options_.max_pixels);
+  if (options_.max_milliseconds > 0.0)
+    used = std::max(used, elapsedMilliseconds() / options_.max_milliseconds);
+  return used;
 }
 
 MatchResult SearchLedger::begin(const char* matcher) const {

@@ -30,8 +30,9 @@ class SearchLedger {
   double correlationSeconds() const { return correlation_s_; }
   double elapsedMilliseconds() const { return 1e3 * (now() - start_s_); }
   std::int64_t pixelsSearched() const { return pixels_; }
-  /// Whether a budget of the options is used up.
-  bool isOverBudget() const;
+  /// Share used up of the options' budgets, of the tightest.
+  double budgetUsed() const;
+  bool isOverBudget() const { return budgetUsed() >= 1.0; }
 
   /// Starts a result: sizes, name, candidates, full gates.
   MatchResult begin(const char* matcher) const;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "active_matching_slam/image/warp.h"
 #include "active_matching_slam/tracker/innovation_check.h"
@@ -12,6 +13,8 @@ constexpr double kPoorShare = 0.6, kPoorShareWhenAmbiguous = 0.8;
 /// Of JCBB's joint squared distance: 1 is what the truth has on average when the filter's noise is
 /// what it is told, less when it is told more, and chance fills the whole gate of 1.2 to 1.5.
 constexpr double kCloseChi2PerDegree = 0.5;
+constexpr double kClearlyMore = 1.25;  ///< matches, for RANSAC's to count
+constexpr double kFirstShare = 0.7;  ///< of the budget; a second opinion has the rest, a third less
 constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
 
 }  // namespace
@@ -59,16 +62,18 @@ void Tracker::Implementation::measure(const cv::Mat& image) {
   search_.beginFrame(image, templates_);
 }
 
-/// Asks another matcher, one that sees all matches at once; the larger consensus counts if its
-/// joint squared distance (0 where the matcher has none) is at most `chi2_per_degree`.
-bool Tracker::Implementation::askToo(Matcher& matcher, double chi2_per_degree, const cv::Mat& image,
+/// Asks another matcher, one that sees all matches at once, within a share of the frame's budget;
+/// a consensus that is larger by a factor counts, if its joint squared distance (0 where the
+/// matcher has none) is at most `chi2_per_degree`.
+bool Tracker::Implementation::askToo(Matcher& matcher, double share, double factor,
+                                     double chi2_per_degree, const cv::Mat& image,
                                      TrackedFrame* frame) {
   second_search_.beginFrame(image, templates_);
-  MatchResult second = matcher.match(prior_, second_search_, options_.matching);
+  MatchResult second = matcher.match(prior_, second_search_, partOfBudget(share));
   MatchStatistics& first = frame->matching.statistics;
   const double both_ms = second.statistics.total_ms + first.total_ms;
   const bool is_better =
-      second.statistics.matched >= first.matched &&
+      second.statistics.matched >= factor * first.matched &&
       second.statistics.mahalanobis2 <= 2.0 * second.statistics.matched * chi2_per_degree;
   if (is_better) {
     second.statistics.pixels_searched += first.pixels_searched;
@@ -79,6 +84,15 @@ bool Tracker::Implementation::askToo(Matcher& matcher, double chi2_per_degree, c
   return is_better;
 }
 
+MatchOptions Tracker::Implementation::partOfBudget(double share) const {
+  MatchOptions options = options_.matching;
+  options.max_milliseconds *= share;
+  if (options.max_pixels > 0)
+    options.max_pixels =
+        std::max<std::int64_t>(1, std::llround(share * static_cast<double>(options.max_pixels)));
+  return options;
+}
+
 /// Asks the matcher, and another when far fewer features matched than should have. Where structure
 /// repeats in gates as wide as the image, a sequential matcher can lose the true hypothesis among
 /// hundreds of equals while all are still short: JCBB, which asks for the longest, is asked. Since
@@ -86,15 +100,21 @@ bool Tracker::Implementation::askToo(Matcher& matcher, double chi2_per_degree, c
 /// a sequential matcher that follows something that moves by itself (a hand, a door) first, can end
 /// up with that and little else: RANSAC is asked.
 void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
-  frame->matching = matcher_->match(prior_, search_, options_.matching);
-  if (!options_.second_opinion) return;
+  if (!options_.second_opinion) {
+    frame->matching = matcher_->match(prior_, search_, options_.matching);
+    return;
+  }
+  frame->matching = matcher_->match(prior_, search_, partOfBudget(kFirstShare));
   const double expected = map_.expectedMatches(candidates_);
   const int matched = frame->matching.statistics.matched;
   if (expected < 8.0) return;
-  if (frame->matching.statistics.ambiguous && matched <= kPoorShareWhenAmbiguous * expected &&
-      askToo(*longest_matcher_, kCloseChi2PerDegree, image, frame))
-    return;
-  if (matched <= kPoorShare * expected) askToo(*consensus_matcher_, 0.0, image, frame);
+  double share = 1.0 - kFirstShare;
+  if (frame->matching.statistics.ambiguous && matched <= kPoorShareWhenAmbiguous * expected) {
+    if (askToo(*longest_matcher_, share, 1.0, kCloseChi2PerDegree, image, frame)) return;
+    share *= 0.5;
+  }
+  if (matched <= kPoorShare * expected)
+    askToo(*consensus_matcher_, share, kClearlyMore, 0.0, image, frame);
 }
 
 /// Fuses the accepted matches.

@@ -143,5 +143,27 @@ TEST_F(RecordedSequences, ActiveMatchingSearchesAFractionOfTheGates) {
   }
 }
 
+// The first images, of which the filter knows least, take the matchers longest.
+TEST_F(RecordedSequences, AStartInAHurryIsNoLostStart) {
+  const std::string folder = recordedDataFolder() + "/sevenscenes_redkitchen";
+  RecordedSequence sequence(folder);
+  TrackerOptions options;
+  double now_s = 0.0;
+  options.matching.clock_s = [&now_s] { return now_s += 2e-5; };  // for each look at it
+  options.matching.max_milliseconds = 5.0;
+  Tracker tracker(sequence.camera(), options);
+  int frames = 0, cut_short = 0;
+  sequence.forEachFrame([&](const cv::Mat& image, double stamp_s) {
+    const auto frame = tracker.track(image, stamp_s);
+    cut_short += frame->matching.statistics.cut_short;
+    if (frames > 0 && !frame->repeated_image) {
+      EXPECT_EQ(TrackingState::kTracking, frame->state) << frames;
+      EXPECT_GE(frame->matching.statistics.matched, 12) << frames;
+    }
+    return ++frames < 90;
+  });
+  EXPECT_GE(cut_short, 5);
+}
+
 }  // namespace
 }  // namespace active_matching_slam

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <Eigen/LU>
 
 #include "filter/example_bundle.h"
@@ -131,6 +133,31 @@ TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
   const int kept = size - 6;
   ASSERT_EQ(covariance.rows(), kept);
   EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
+}
+
+TEST(BundleAdjustment, AFeatureThatNoImageShowsIsNoFault) {
+  const CameraModel model(exampleCalibration());
+  const Bundle truth = exampleBundle(model, 8, 30, 0.05, 0.0, 6);
+  Bundle bundle = withoutKnowledge(truth);
+  for (auto& observations : bundle.observations)
+    observations.erase(std::remove_if(observations.begin(), observations.end(),
+                                      [](const BundleObservation& o) { return o.feature == 7; }),
+                       observations.end());
+  const Eigen::Vector3d bearing = bundle.features[7].bearing_world;
+  EXPECT_LT(adjustBundle(model, weakPrior(), &bundle), 5.0);
+  EXPECT_LT((bundle.features[7].bearing_world - bearing).norm(), 1e-12);
+  EXPECT_LT(featureErrors(model, bundle)[6], 0.02);
+}
+
+TEST(BundleAdjustment, EndsEarlyWhereTheCostWontFallFarEnough) {
+  const CameraModel model(exampleCalibration());
+  Bundle full = exampleBundle(model, 8, 30, 0.05, 1.0, 8), brief = full;
+  reverseDepths(model, &full);
+  reverseDepths(model, &brief);
+  BundleOptions options = weakPrior();
+  const double reached = adjustBundle(model, options, &full);
+  options.hopeless_cost = 1e-3 * reached;
+  EXPECT_GT(adjustBundle(model, options, &brief), reached);
 }
 
 TEST(BundleAdjustment, AWanderingFeatureHardlyMovesTheRest) {

@@ -22,6 +22,13 @@ struct MatchOptions {
   UpdateRule update_rule = UpdateRule::kIncremental;
   double prune_weight = 0.001;  ///< Gaussians below are dropped, [0, 1)
   int max_gaussians = 0;        ///< cap on the live mixture; the lightest go first; 0: no cap
+  /// Siblings, Gaussians born of one search, become one where they differ by less than so many
+  /// sigma in what they expect of every other feature; 0: never. The better one stays, with the
+  /// weight of both.
+  double merge_sigmas = 0.0;
+  /// Which of the merged matches is right may stay open: the better one is accepted only if its
+  /// probability among them, by position and similarity, is at least this.
+  double merge_share = 0.9;
   double latch_information_bits = 0.0;  ///< stop rule (a): below, no more MI is computed; 0: never
   /// Stop rule: done when the heaviest Gaussian weighs at least this and has no feature left to
   /// search; 0: never, the search goes on until no Gaussian has a candidate.
@@ -32,7 +39,7 @@ struct MatchOptions {
   double fast_accept_weight = 0.7;  ///< fast_active: weight at which a Gaussian is taken after that
   std::uint64_t seed = 1;           ///< fast_active, one_point_ransac
 
-  // Budget of a frame: active, fast_active, chow_liu, jcbb (time).
+  // Budget of a frame, which ends with the search that uses it up.
   std::int64_t max_pixels = 0;    ///< distinct pixels searched; 0: no limit
   double max_milliseconds = 0.0;  ///< 0: no limit
   /// auto: active is taken while its modelled cost is below this (and below max_milliseconds, if

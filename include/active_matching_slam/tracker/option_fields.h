@@ -112,6 +112,14 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matching.prune_weight, 0.0, 0.5);
   visit(F{"matching/max_gaussians", "cap on the mixture; 0: none", true}, o.matching.max_gaussians,
         0, 100000);
+  visit(
+      F{"matching/merge_sigmas",
+        "Gaussians that differ in one match only, and in what they expect by less [sigma], become "
+        "one; 0: never",
+        true},
+      o.matching.merge_sigmas, 0.0, 10.0);
+  visit(F{"matching/merge_share", "probability at which one of such matches is accepted", true},
+        o.matching.merge_share, 0.0, 1.0);
   visit(F{"matching/latch_information_bits",
           "below, no more mutual information is computed [bit]; "
           "0: never",
