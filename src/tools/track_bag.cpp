@@ -21,6 +21,7 @@
 #include "camera_bag_writer.h"
 #include "common/bag_image_source.h"
 #include "common/progress_bar.h"
+#include "tracked_bag_writer.h"
 
 namespace active_matching_slam {
 namespace {
@@ -37,6 +38,7 @@ struct Settings {
   int features = 0;
   RunOptions run;
   bool ground_truth_topic_given = false, simulated = false, annotate = false;
+  bool output_bag = false;
 };
 
 po::options_description describeOptions(Settings* s) {
@@ -46,8 +48,9 @@ po::options_description describeOptions(Settings* s) {
   add("help,h", "this text");
   add("bag", text(&s->bag)->required(), "bag to track");
   add("output", text(&s->output)->required(),
-      "directory for trajectory.txt, statistics.csv, summary.json, trajectory.png and the map's "
-      "structure (mutual_information.csv, submaps.csv, submap_quality.csv, pictures)");
+      "directory for trajectory.txt, statistics.csv, summary.json, trajectory.png, final.map (for "
+      "~load_map) and the map's structure (mutual_information.csv, submaps.csv, "
+      "submap_quality.csv, pictures)");
   add("image-topic", text(&s->image_topic)->default_value("/camera/image_raw"),
       "raw or compressed images");
   add("camera-info-topic", text(&s->camera_info_topic),
@@ -67,6 +70,9 @@ po::options_description describeOptions(Settings* s) {
   add("simulated", po::bool_switch(&s->simulated),
       "the truth is exact: hold errors against the covariance (NEES); implied by a bag of "
       "simulate_bag");
+  add("output-bag", po::bool_switch(&s->output_bag),
+      "also write tracked.bag: tf, and what a node called tracker publishes of pose, odometry, "
+      "state, statistics and map");
   add("annotate", po::bool_switch(&s->annotate),
       "also write annotated.avi: what was predicted, searched and matched");
   add("draw", po::value(&s->draw)->composing(),
@@ -184,6 +190,10 @@ void run(const Settings& settings) {
   if (settings.annotate || !settings.draw.empty())
     video = std::make_unique<AnnotatedVideo>(settings.output + "/annotated.avi",
                                              drawingOf(settings.draw));
+  bool has_map = false;
+  std::unique_ptr<TrackedBagWriter> tracked;
+  if (settings.output_bag)
+    tracked = std::make_unique<TrackedBagWriter>(settings.output + "/tracked.bag");
   int total = (images.size() + settings.run.every - 1) / std::max(1, settings.run.every);
   if (settings.run.maximum_frames > 0) total = std::min(total, settings.run.maximum_frames);
   {
@@ -191,7 +201,9 @@ void run(const Settings& settings) {
     int done = 0;
     runSequence(&images, &tracker, settings.run, [&](const TrackedFrame& frame) {
       report.add(frame);
+      has_map = !frame.features.empty();
       if (video) video->add(frame);
+      if (tracked) tracked->add(frame);
       const MatchStatistics& matching = frame.matching.statistics;
       progress.advance(++done, trackingStateName(frame.state) + ", " +
                                    std::to_string(matching.matched) + " of " +
@@ -199,6 +211,7 @@ void run(const Settings& settings) {
     });
   }
   report.write(settings.output);
+  if (has_map) tracker.saveMap(settings.output + "/final.map");
   printSummary(report.summary(), settings.output);
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
+#include <rosbag/view.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@
 #include <sstream>
 
 #include "active_matching_slam/evaluation/trajectory.h"
+#include "active_matching_slam/map/map_file.h"
 #include "tools/camera_bag_writer.h"
 
 namespace active_matching_slam {
@@ -133,6 +135,25 @@ TEST_F(TrackBag, TracksABagAndWritesItsFourFiles) {
   EXPECT_TRUE(std::filesystem::exists(path("run/statistics.csv")));
   EXPECT_TRUE(std::filesystem::exists(path("run/trajectory.png")));
   EXPECT_TRUE(summary("run")["nees_mean"].is_null());
+}
+
+TEST_F(TrackBag, LeavesTheMapAndABagOfWhatANodePublishes) {
+  ASSERT_EQ(track("slide.bag", "--output-bag", "kept").status, 0);
+  rosbag::Bag bag(path("kept/tracked.bag"));
+  for (const char* topic : {"/tracker/pose", "/tracker/odometry", "/tracker/state", "/tracker/map",
+                            "/tracker/statistics", "/tf"})
+    EXPECT_EQ(rosbag::View(bag, rosbag::TopicQuery(topic)).size(),
+              static_cast<std::uint32_t>(kFrames))
+        << topic;
+  const Trajectory trajectory = readTrajectoryTum(path("kept/trajectory.txt"));
+  rosbag::View poses(bag, rosbag::TopicQuery("/tf"));
+  std::size_t i = 0;
+  for (const rosbag::MessageInstance& instance : poses) {
+    const auto& transform = instance.instantiate<tf2_msgs::TFMessage>()->transforms.front();
+    EXPECT_NEAR(transform.transform.translation.x,
+                trajectory[i++].T_world_camera.translation().x(), 1e-6);
+  }
+  EXPECT_FALSE(readMapFile(path("kept/final.map")).map.empty());
 }
 
 TEST_F(TrackBag, TheSameRunGivesTheSameResultBitForBit) {

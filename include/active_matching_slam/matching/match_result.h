@@ -71,7 +71,8 @@ struct MatchStatistics {
 /// The outcome of a frame. Match indices point into FeatureSearch::matches(feature).
 struct MatchResult {
   std::vector<int> match_of_feature;  ///< F: accepted match, or -1. When ambiguous: only what all
-                                      ///< strong hypotheses share
+                                      ///< strong hypotheses share; never one of twin matches that
+                                      ///< were merged and left open
   std::vector<MatchHypothesis> hypotheses;      ///< heaviest first; never empty when F > 0
   std::vector<std::pair<int, int>> tree_edges;  ///< chow_liu: (i, j), i < j; else empty
   MatchStatistics statistics;
