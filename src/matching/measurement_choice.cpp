@@ -184,14 +184,4 @@ Measurement MeasurementChoice::firstOf(int hypothesis) {
   return {};
 }
 
-Measurement MeasurementChoice::smallestOf(int hypothesis) {
-  const auto& candidates = mixture_.hypotheses()[slot(hypothesis)].candidates;
-  int smallest = -1;
-  for (int c = 0; c < static_cast<int>(candidates.size()); ++c)
-    if ((smallest < 0 || candidates[slot(c)].area < candidates[slot(smallest)].area) &&
-        isCandidate(hypothesis, c))
-      smallest = c;
-  return {hypothesis, smallest, {}};
-}
-
 }  // namespace active_matching_slam

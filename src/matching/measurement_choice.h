@@ -41,8 +41,6 @@ class MeasurementChoice {
   Measurement bestOfDrawn(int count, std::mt19937_64& random, double& most_bits);
   /// The lowest candidate of one hypothesis, without any evaluation.
   Measurement firstOf(int hypothesis);
-  /// That of the smallest ellipse.
-  Measurement smallestOf(int hypothesis);
 
   ExpectedInformation evaluate(int g, int c);
 

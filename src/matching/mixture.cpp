@@ -16,11 +16,7 @@ std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
                  std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
-    : joint_(joint),
-      ledger_(ledger),
-      options_(options),
-      likelihoods_(std::move(likelihoods)),
-      limit_(options.max_gaussians) {
+    : joint_(joint), ledger_(ledger), options_(options), likelihoods_(std::move(likelihoods)) {
   Hypothesis root;
   const std::size_t size = slot(joint.size());
   root.joint = joint.prior();

@@ -103,9 +103,6 @@ class Mixture {
   /// is known but outside the ellipses that g or its ancestors searched.
   bool isSterile(int g, int c);
 
-  /// At most so many are kept from the next update on; 0: no limit.
-  void setLimit(int gaussians) { limit_ = gaussians; }
-
   /// Searches candidate c of hypothesis g and updates the mixture. `step` gets what came of it.
   void searchAndUpdate(int g, int c, MatchStep& step);
   /// Fuses a match of feature f into g without asking the others; g keeps its id and weight.
@@ -163,7 +160,6 @@ class Mixture {
   PairTerm scratch_;  // of a Gaussian without an entry
   int next_id_ = 1;
   int most_gaussians_ = 1;
-  int limit_;
   bool was_capped_ = false;
 };
 

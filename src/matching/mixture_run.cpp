@@ -7,17 +7,8 @@
 namespace active_matching_slam {
 namespace {
 
-/// Hypotheses of an ambiguous frame that together weigh as much are the strong ones.
-constexpr double kStrongShare = 0.9;
-/// With a budget of time, a mixture beyond so many pairs of Gaussians and features draws its
-/// candidates.
-constexpr std::size_t kMostEvaluations = 4000;
-/// Share of the budget after which the run hurries: no more mutual information, few Gaussians, and
-/// the rest of the features as Fast Active Matching does it once one Gaussian dominates.
-constexpr double kBudgetForChoice = 0.35;
-constexpr int kGaussiansInHurry = 8;
-/// Share after which it goes on with the heaviest Gaussian whether it dominates or not.
-constexpr double kBudgetForDoubt = 0.7;
+/// Share of the budget after which the heaviest Gaussian is taken whether it dominates or not.
+constexpr double kBudgetForDoubt = 0.75;
 
 std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
@@ -57,16 +48,13 @@ void MixtureRun::run(MatchResult& result) {
   double information_s = 0.0;
   const double start = ledger_.now();
   while (!isFinished()) {
-    if (ledger_.isOverBudget()) break;
-    if (!hurries_ && ledger_.budgetUsed() >= kBudgetForChoice) {
-      statistics.cut_short = hurries_ = true;
+    const bool dominates =
+        policy_ == Policy::kFast && latched_ &&
+        mixture_.hypotheses()[slot(mixture_.heaviest())].weight > options_.fast_accept_weight;
+    const bool must_end = ledger_.budgetUsed() >= kBudgetForDoubt;
+    if (dominates || must_end) {
+      statistics.cut_short |= must_end;
       if (!latched_) latch();
-      mixture_.setLimit(kGaussiansInHurry);
-    }
-    const double weight = mixture_.hypotheses()[slot(mixture_.heaviest())].weight;
-    if ((latched_ && (policy_ == Policy::kFast || hurries_) &&
-         weight > options_.fast_accept_weight) ||
-        ledger_.budgetUsed() >= kBudgetForDoubt) {
       acceptNearest(result);
       break;
     }
@@ -99,14 +87,7 @@ Measurement MixtureRun::choose() {
     if (next.exists() && most_bits < options_.fast_latch_bits) latch();
     return next;
   }
-  // With a budget of time, a large mixture's candidates are drawn as FAM draws them: each
-  // evaluation asks every Gaussian.
-  const std::size_t gaussians = mixture_.hypotheses().size();
-  double most_bits = 0.0;
-  const bool draws = options_.max_milliseconds > 0.0 &&
-                     gaussians * gaussians * slot(prior_.size()) > kMostEvaluations;
-  const Measurement next =
-      draws ? choice_.bestOfDrawn(options_.fast_candidates, random_, most_bits) : choice_.best();
+  const Measurement next = choice_.best();
   if (!next.exists() || next.expected.bits() >= options_.latch_information_bits) return next;
   if (options_.latch_information_bits <= 0.0) return next;
   latch();
@@ -118,10 +99,8 @@ void MixtureRun::latch() {
   mixture_.forgetTerms();
 }
 
-/// The heaviest Gaussian's lowest candidate, in a hurry its smallest; FAM goes on to the next
-/// heaviest when it has none.
+/// The heaviest Gaussian's lowest candidate; FAM goes on to the next heaviest when it has none.
 Measurement MixtureRun::chooseAfterLatch() {
-  if (hurries_) return choice_.smallestOf(mixture_.heaviest());
   if (policy_ == Policy::kFull) return choice_.firstOf(mixture_.heaviest());
   std::vector<int> order;
   for (int k = 0; k < static_cast<int>(mixture_.hypotheses().size()); ++k) order.push_back(k);
@@ -139,7 +118,7 @@ Measurement MixtureRun::chooseAfterLatch() {
 void MixtureRun::acceptNearest(MatchResult& result) {
   const int dominant = mixture_.heaviest();
   while (true) {
-    const Measurement next = hurries_ ? choice_.smallestOf(dominant) : choice_.firstOf(dominant);
+    const Measurement next = choice_.firstOf(dominant);
     if (!next.exists()) return;
     if (ledger_.isOverBudget()) {
       result.statistics.cut_short = true;
@@ -212,9 +191,9 @@ void MixtureRun::report(MatchResult& result) const {
   result.match_of_feature = result.hypotheses.front().match_of_feature;
   statistics.ambiguous = accepted.weight < options_.ambiguous_below_weight;
   if (!statistics.ambiguous) return;
-  // Strong are the heaviest hypotheses that together are almost certain to hold the truth.
+  // Strong are the heaviest hypotheses that together reach the weight asked for.
   double together = accepted.weight;
-  for (std::size_t k = 1; k < ordered.size() && together < kStrongShare; ++k) {
+  for (std::size_t k = 1; k < ordered.size() && together < options_.ambiguous_below_weight; ++k) {
     together += ordered[k]->weight;
     for (int f = 0; f < prior_.size(); ++f) {
       int& match = result.match_of_feature[slot(prior_.original(f))];

@@ -43,7 +43,6 @@ class MixtureRun {
   MeasurementChoice choice_;
   std::mt19937_64 random_;
   bool latched_ = false;
-  bool hurries_ = false;  ///< to end within the budget
 };
 
 }  // namespace active_matching_slam

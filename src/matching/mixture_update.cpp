@@ -208,7 +208,7 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
   double heaviest = 0.0;
   for (const Entry& e : entries) heaviest = std::max(heaviest, e.weight);
   double least = std::min(options_.prune_weight, heaviest);
-  const auto limit = slot(limit_);
+  const auto limit = slot(options_.max_gaussians);
   const auto dropLight = [&] {
     entries.erase(std::remove_if(entries.begin(), entries.end(),
                                  [&](const Entry& e) { return e.weight < least; }),

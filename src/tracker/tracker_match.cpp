@@ -84,9 +84,11 @@ bool Tracker::Implementation::askToo(Matcher& matcher, double share, double fact
   return is_better;
 }
 
+/// A slower camera, or a gap, leaves more time: the budget is meant for 30 Hz.
 MatchOptions Tracker::Implementation::partOfBudget(double share) const {
   MatchOptions options = options_.matching;
-  options.max_milliseconds *= share;
+  const double interval_s = std::min(interval_s_, options_.max_frame_interval_s);
+  options.max_milliseconds *= share * std::max(1.0, 30.0 * interval_s);
   if (options.max_pixels > 0)
     options.max_pixels =
         std::max<std::int64_t>(1, std::llround(share * static_cast<double>(options.max_pixels)));
@@ -101,7 +103,7 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
 /// up with that and little else: RANSAC is asked.
 void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   if (!options_.second_opinion) {
-    frame->matching = matcher_->match(prior_, search_, options_.matching);
+    frame->matching = matcher_->match(prior_, search_, partOfBudget(1.0));
     return;
   }
   frame->matching = matcher_->match(prior_, search_, partOfBudget(kFirstShare));

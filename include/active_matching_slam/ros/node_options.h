@@ -25,7 +25,7 @@ struct DrawOptions {
 /// the time that matching a frame may take.
 inline TrackerOptions liveTrackerOptions() {
   TrackerOptions options;
-  options.matching.max_milliseconds = 12.0;
+  options.matching.max_milliseconds = 20.0;
   return options;
 }
 

@@ -140,7 +140,8 @@ void visitOptions(Options& o, Visitor&& visit) {
   visit(F{"matching/max_pixels", "distinct pixels searched in a frame; 0: no limit", true},
         o.matching.max_pixels, std::int64_t{0}, std::int64_t{1} << 40);
   visit(F{"matching/max_milliseconds",
-          "time for matching a frame [ms]; 0: no limit. track_bag, which "
+          "time for matching a frame at 30 Hz, more in proportion at lower rates [ms]; 0: no "
+          "limit. track_bag, which "
           "repeats bit for bit, has none",
           true},
         o.matching.max_milliseconds, 0.0, 1e6);
