@@ -49,7 +49,7 @@ class Tracker::Implementation {
   void follow(const cv::Mat& image, TrackedFrame* frame);
   void predict(double interval_s);
   void measure(const cv::Mat& image);
-  bool askToo(Matcher& matcher, double share, double factor, double chi2_per_degree,
+  bool askToo(Matcher& matcher, double share, double least, double chi2_per_degree,
               const cv::Mat& image, TrackedFrame* frame);
   MatchOptions partOfBudget(double share) const;
   void match(const cv::Mat& image, TrackedFrame* frame);

@@ -13,6 +13,9 @@ constexpr double kPoorShare = 0.6, kPoorShareWhenAmbiguous = 0.8;
 /// Of JCBB's joint squared distance: 1 is what the truth has on average when the filter's noise is
 /// what it is told, less when it is told more, and chance fills the whole gate of 1.2 to 1.5.
 constexpr double kCloseChi2PerDegree = 0.5;
+constexpr double kLeastShare = 0.1;  ///< of the matches expected: fewer are chance
+constexpr int kFewPoorFrames = 2;
+constexpr double kMajority = 0.5;      ///< of the matches expected, for JCBB's to count
 constexpr double kClearlyMore = 1.25;  ///< matches, for RANSAC's to count
 constexpr double kFirstShare = 0.7;  ///< of the budget; a second opinion has the rest, a third less
 constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
@@ -63,9 +66,9 @@ void Tracker::Implementation::measure(const cv::Mat& image) {
 }
 
 /// Asks another matcher, one that sees all matches at once, within a share of the frame's budget;
-/// a consensus that is larger by a factor counts, if its joint squared distance (0 where the
-/// matcher has none) is at most `chi2_per_degree`.
-bool Tracker::Implementation::askToo(Matcher& matcher, double share, double factor,
+/// a consensus of at least so many counts, if its joint squared distance (0 where the matcher has
+/// none) is at most `chi2_per_degree`.
+bool Tracker::Implementation::askToo(Matcher& matcher, double share, double least,
                                      double chi2_per_degree, const cv::Mat& image,
                                      TrackedFrame* frame) {
   second_search_.beginFrame(image, templates_);
@@ -73,7 +76,7 @@ bool Tracker::Implementation::askToo(Matcher& matcher, double share, double fact
   MatchStatistics& first = frame->matching.statistics;
   const double both_ms = second.statistics.total_ms + first.total_ms;
   const bool is_better =
-      second.statistics.matched >= factor * first.matched &&
+      second.statistics.matched >= least &&
       second.statistics.mahalanobis2 <= 2.0 * second.statistics.matched * chi2_per_degree;
   if (is_better) {
     second.statistics.pixels_searched += first.pixels_searched;
@@ -110,13 +113,22 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   const double expected = map_.expectedMatches(candidates_);
   const int matched = frame->matching.statistics.matched;
   if (expected < 8.0) return;
-  double share = 1.0 - kFirstShare;
-  if (frame->matching.statistics.ambiguous && matched <= kPoorShareWhenAmbiguous * expected) {
-    if (askToo(*longest_matcher_, share, 1.0, kCloseChi2PerDegree, image, frame)) return;
-    share *= 0.5;
+  // After some poor frames the ellipses are so wide that chance alone makes a consensus.
+  if (poor_frames_ <= kFewPoorFrames) {
+    double share = 1.0 - kFirstShare;
+    bool is_settled = false;
+    if (frame->matching.statistics.ambiguous && matched <= kPoorShareWhenAmbiguous * expected) {
+      is_settled = askToo(*longest_matcher_, share, std::max(1.0 * matched, kMajority * expected),
+                          kCloseChi2PerDegree, image, frame);
+      share *= 0.5;
+    }
+    if (!is_settled && matched <= kPoorShare * expected)
+      askToo(*consensus_matcher_, share, kClearlyMore * matched, 0.0, image, frame);
   }
-  if (matched <= kPoorShare * expected)
-    askToo(*consensus_matcher_, share, kClearlyMore, 0.0, image, frame);
+  MatchResult& result = frame->matching;
+  if (result.statistics.matched >= kLeastShare * expected) return;
+  std::fill(result.match_of_feature.begin(), result.match_of_feature.end(), -1);
+  result.statistics.matched = 0;
 }
 
 /// Fuses the accepted matches.

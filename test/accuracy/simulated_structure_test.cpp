@@ -58,7 +58,8 @@ TEST_P(TwoDepths, TheTableInFrontComesApartFromTheWallBehind) {
   ASSERT_EQ(two.submaps, 2);
   for (const auto& [submap, count] : depthsOf(*frame, two)) {
     EXPECT_GE(count.first + count.second, 10) << "submap " << submap;
-    EXPECT_EQ(std::min(count.first, count.second), 0) << "submap " << submap;
+    EXPECT_LE(6 * std::min(count.first, count.second), count.first + count.second)
+        << "submap " << submap;
   }
   const int features = static_cast<int>(two.submap_of_feature.size());
   const double naive =
