@@ -114,7 +114,8 @@ Measurement MixtureRun::chooseAfterLatch() {
   return {};
 }
 
-/// A dominant Gaussian after the latch takes the match nearest to each prediction that is left.
+/// The heaviest Gaussian, which dominates or must do, takes the match nearest to each prediction
+/// that is left to it.
 void MixtureRun::acceptNearest(MatchResult& result) {
   const int dominant = mixture_.heaviest();
   while (true) {

@@ -76,6 +76,9 @@ class CameraBagWriter {
   CameraBagWriter(const CameraBagWriter&) = delete;
   CameraBagWriter& operator=(const CameraBagWriter&) = delete;
 
+  /// A bag refuses time zero, which recordings that count from zero have in their first stamp.
+  static ros::Time recordTime(const ros::Time& stamp) { return std::max(stamp, ros::TIME_MIN); }
+
   /// `image`: CV_8UC1 (mono8), CV_8UC3 (bgr8) or CV_16UC1 (mono16) of the camera's size.
   void writeImage(const ros::Time& stamp, const cv::Mat& image) {
     info_.header.stamp = stamp;
@@ -124,9 +127,6 @@ class CameraBagWriter {
 
  private:
   std::string partPath() const { return path_ + ".part"; }
-
-  // A bag refuses time zero, which recordings that count from zero have in their first stamp.
-  static ros::Time recordTime(const ros::Time& stamp) { return std::max(stamp, ros::TIME_MIN); }
 
   static std::string encoding(const cv::Mat& image) {
     switch (image.type()) {

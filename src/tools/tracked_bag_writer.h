@@ -7,6 +7,7 @@
 
 #include "active_matching_slam/ros/frame_conversions.h"
 #include "active_matching_slam/ros/pose_conversions.h"
+#include "camera_bag_writer.h"
 
 namespace active_matching_slam {
 
@@ -19,7 +20,7 @@ class TrackedBagWriter {
   void add(const TrackedFrame& frame) {
     std_msgs::Header header;
     header.stamp.fromSec(frame.stamp_s);
-    const ros::Time time = header.stamp.isZero() ? ros::TIME_MIN : header.stamp;
+    const ros::Time time = CameraBagWriter::recordTime(header.stamp);
     header.frame_id = kCamera;
     bag_.write("/tracker/state", time, toTrackingStateMsg(frame, header));
     bag_.write("/tracker/statistics", time, toStatisticsMsg(frame, 0, header));

@@ -13,8 +13,8 @@ constexpr double kPoorShare = 0.6, kPoorShareWhenAmbiguous = 0.8;
 /// Of JCBB's joint squared distance: 1 is what the truth has on average when the filter's noise is
 /// what it is told, less when it is told more, and chance fills the whole gate of 1.2 to 1.5.
 constexpr double kCloseChi2PerDegree = 0.5;
-constexpr double kLeastShare = 0.1;  ///< of the matches expected: fewer are chance
-constexpr int kFewPoorFrames = 2;
+constexpr double kLeastShare = 0.1;    ///< of the matches expected: fewer are chance
+constexpr int kFewPoorFrames = 2;      ///< after more, no second opinion
 constexpr double kMajority = 0.5;      ///< of the matches expected, for JCBB's to count
 constexpr double kClearlyMore = 1.25;  ///< matches, for RANSAC's to count
 constexpr double kFirstShare = 0.7;  ///< of the budget; a second opinion has the rest, a third less
