@@ -12,8 +12,9 @@
 namespace active_matching_slam {
 namespace {
 
-/// More than one, so that what the worker leaves behind is counted there and not lost unseen here.
-constexpr int kQueueSize = 4;
+/// An image is only handed on, so that a queue is no delay. It is long so that what the worker leaves
+/// behind is counted there, and not lost unseen here while a service is answered.
+constexpr int kQueueSize = 50;
 /// camera_info may come a little later than the first image.
 constexpr double kInfoDelay_s = 2.0;
 
