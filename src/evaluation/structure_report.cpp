@@ -11,6 +11,7 @@
 
 #include "active_matching_slam/evaluation/plot_canvas.h"
 #include "active_matching_slam/evaluation/text_file.h"
+#include "active_matching_slam/information/submap_color.h"
 
 namespace active_matching_slam {
 namespace {
@@ -52,13 +53,9 @@ std::vector<int> rowsOf(const std::vector<int>& order) {
   return rows;
 }
 
-cv::Scalar clusterColour(int cluster) {
-  // Steps of the golden angle keep neighbours apart.
-  const double hue = std::fmod(cluster * 137.507764, 360.0);
-  cv::Mat pixel(1, 1, CV_8UC3, cv::Scalar(hue / 2.0, 170, 235));
-  cv::cvtColor(pixel, pixel, cv::COLOR_HSV2BGR);
-  const cv::Vec3b bgr = pixel.at<cv::Vec3b>(0, 0);
-  return {static_cast<double>(bgr[0]), static_cast<double>(bgr[1]), static_cast<double>(bgr[2])};
+cv::Scalar submapColour(int submap) {
+  const Eigen::Vector3f rgb = 255.0f * submapRgb(submap);
+  return {rgb[2], rgb[1], rgb[0]};
 }
 
 /// Bits to colours; the root lifts weak links out of the dark.
@@ -77,7 +74,7 @@ cv::Mat coloured(const cv::Mat& bits, double brightest_bits) {
 
 struct Panel {
   std::vector<int> order;     ///< features from left to right and top to bottom
-  std::vector<int> clusters;  ///< per feature
+  std::vector<int> clusters;  ///< label of each feature, which is a colour too
   std::vector<char> links;    ///< per edge, which are shown
   std::string title;
 };
@@ -100,7 +97,7 @@ void drawPanel(cv::Mat& picture, cv::Point corner, const std::vector<WeightedEdg
     int end = begin;
     while (end < features && panel.clusters[panel.order[end]] == cluster) ++end;
     const int from = begin * kPanel / features, to = end * kPanel / features;
-    const cv::Scalar colour = clusterColour(cluster);
+    const cv::Scalar colour = submapColour(cluster);
     cv::rectangle(picture, cv::Point(corner.x + from, corner.y + from),
                   cv::Point(corner.x + to - 1, corner.y + to - 1), colour, 1);
     cv::rectangle(picture, cv::Point(corner.x - 12, corner.y + from),
@@ -191,9 +188,10 @@ cv::Mat informationMatrixPicture(const MutualInformationGraph& graph,
   std::snprintf(heading, sizeof(heading), "Mutual information of %d features, level %d: %d submaps",
                 features, level, chosen.submaps);
   putPlotText(&picture, heading, {kMargin, 32}, 0.7);
+  const std::vector<int>& labels = chosen.submap_of_feature;
   const Panel panels[2][2] = {
-      {{by_submap, submaps, all, "all links, features ordered by submap"},
-       {by_submap, submaps, preservedLinks(edges, submaps, chosen.submaps),
+      {{by_submap, labels, all, "all links, features ordered by submap"},
+       {by_submap, labels, preservedLinks(edges, submaps, chosen.submaps),
         percent("Chow-Liu", chosen.preserved_chow_liu)}},
       {{by_id, naive, all, "all links, features in order of initialisation"},
        {by_id, naive, preservedLinks(edges, naive, chosen.submaps),

@@ -12,8 +12,8 @@
 namespace active_matching_slam {
 namespace {
 
-/// An image is only handed on, so that a queue is no delay. It is long so that what the worker leaves
-/// behind is counted there, and not lost unseen here while a service is answered.
+/// An image is only handed on, so that a queue is no delay. It is long so that what the worker
+/// leaves behind is counted there, and not lost unseen here while a service is answered.
 constexpr int kQueueSize = 50;
 /// camera_info may come a little later than the first image.
 constexpr double kInfoDelay_s = 2.0;

@@ -8,6 +8,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "active_matching_slam/information/submap_color.h"
 #include "active_matching_slam/ros/submap_view.h"
 
 namespace active_matching_slam {
@@ -87,9 +88,13 @@ cv::Scalar statusColor(const TrackedFeature& feature) {
 
 /// From first (0) to last (1): even steps in brightness, readable without colour vision.
 cv::Scalar orderColor(double share) {
-  cv::Mat value(1, 1, CV_8UC1, cv::Scalar(40 + 215 * std::clamp(share, 0.0, 1.0))), color;
-  cv::applyColorMap(value, color, cv::COLORMAP_VIRIDIS);
-  const cv::Vec3b bgr = color.at<cv::Vec3b>(0, 0);
+  static const cv::Mat palette = [] {
+    cv::Mat values(1, 256, CV_8UC1), colors;
+    for (int value = 0; value < 256; ++value) values.at<uchar>(value) = uchar(value);
+    cv::applyColorMap(values, colors, cv::COLORMAP_VIRIDIS);
+    return colors;
+  }();
+  const auto& bgr = palette.at<cv::Vec3b>(cvRound(40 + 215 * std::clamp(share, 0.0, 1.0)));
   return {double(bgr[0]), double(bgr[1]), double(bgr[2])};
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "active_matching_slam/information/submap_color.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 
 namespace active_matching_slam {

@@ -7,6 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "active_matching_slam/information/submap_color.h"
+
 namespace active_matching_slam {
 namespace {
 
@@ -64,6 +66,18 @@ TEST(StructureReport, PictureShowsWhatEachPartitionPreserves) {
   EXPECT_DOUBLE_EQ(cell(right, upper, 3, 1), cell(right, upper, 0, 0));  // dropped: as no link
   EXPECT_GT(cell(right, lower, 2, 0), cell(right, lower, 1, 0));  // the cut link of 4 bits stays
   EXPECT_DOUBLE_EQ(cell(right, lower, 3, 1), cell(right, lower, 0, 0));  // that of 3 bits does not
+}
+
+TEST(StructureReport, PictureHasTheColoursThatTheSubmapsHaveEverywhere) {
+  MutualInformationGraph graph = twoPairs();
+  SubmapHierarchy hierarchy = buildSubmapHierarchy(graph);
+  for (int& label : hierarchy.levels[1].submap_of_feature) label += 7;
+  const cv::Mat picture = informationMatrixPicture(graph, hierarchy, 1);
+  for (int submap = 0; submap < 2; ++submap) {
+    const cv::Vec3b bar = picture.at<cv::Vec3b>(98 + 240 * submap + 120, 28 - 8);
+    const Eigen::Vector3f rgb = 255.0f * submapRgb(7 + submap);
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(rgb[channel], bar[2 - channel], 1.0);
+  }
 }
 
 TEST(StructureReport, PictureOfNothingAndOfManyFeaturesIsDrawn) {

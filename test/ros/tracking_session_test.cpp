@@ -129,29 +129,22 @@ TEST(TrackingSession, AnImageWithoutAStampIsLeftOutByName) {
   EXPECT_EQ(TrackingState::kTracking, stream.feed()->state);
 }
 
-/// A few seconds of small pictures, tracked in a millisecond each.
+/// A few seconds of the smallest pictures that can be tracked, in a fraction of a millisecond each.
 const Film& tinyFilm() {
-  static const Film film = [] {
-    SimulatorOptions options;
-    options.width = 160;
-    options.height = 120;
-    options.duration_s = 4.0;
-    Simulator simulator(options);
-    Film tiny{simulator.camera(), {}};
-    while (auto frame = simulator.next()) tiny.frames.push_back(*frame);
-    return tiny;
-  }();
+  static const Film film = makeFilm(filmOptions(4.0, {112, 84}));
   return film;
 }
 
 TrackerOptions tinyOptions() {
   TrackerOptions options;
   options.structure = true;
-  options.map.minimum_distance_px = 10.0;
-  options.map.features_per_frame = 15;
-  options.map.maximum_features = 25;
-  options.image.source_patch_size_px = 21;
-  options.image.border_px = 5;
+  options.map.minimum_distance_px = 8.0;
+  options.map.features_per_frame = 8;
+  options.map.maximum_features = 12;
+  options.image.source_patch_size_px = 13;
+  options.image.template_size_px = 7;
+  options.image.border_px = 4;
+  options.matching.max_gaussians = 10;
   options.lost_after_frames = 5;
   return options;
 }
@@ -181,7 +174,6 @@ void expectFiniteMessages(const TrackedFrame& frame, const CameraCalibration& ca
   for (const char* field : {"x", "y", "z", "sigma"})
     for (sensor_msgs::PointCloud2ConstIterator<float> it(cloud, field); it != it.end(); ++it)
       EXPECT_TRUE(std::isfinite(*it)) << field;
-  EXPECT_NO_THROW(drawDebugImage(frame, {}, 1));
 }
 
 /// Messages as no camera should send them, drawn at random from a fixed seed.
@@ -339,8 +331,13 @@ TEST(TrackingSession, NoStreamOfMalformedMessagesDoesMoreThanBeRefused) {
     }
     if (frame->state == TrackingState::kTracking && frame->nis_degrees > 8) ++tracked;
     expectFiniteMessages(*frame, session.calibration());
+    if (run % 4 == 0) {
+      EXPECT_NO_THROW(drawDebugImage(*frame, {}, 1)) << "run " << run;
+    }
     ASSERT_FALSE(testing::Test::HasFailure()) << "run " << run;
   }
+  RecordProperty("tracked", tracked);
+  RecordProperty("refused", refused);
   EXPECT_GT(tracked, runs / 10) << "the stream must leave something to track";
   EXPECT_GT(refused, runs / 20);
 }

@@ -19,10 +19,9 @@ constexpr int kElsewhere = 40;   ///< frames in between
 /// Frames of another place, with the stamps that follow frame kCarriedOff - 1 of the film.
 const Film& elsewhere() {
   static const Film film = [] {
-    SimulatorOptions options;
+    SimulatorOptions options = filmOptions(2.0);
     options.scene = "office";
     options.seed = 5;
-    options.duration_s = 2.0;
     Film other = makeFilm(options);
     for (std::size_t i = 0; i < other.frames.size(); ++i)
       other.frames[i].stamp_s = slowFilm().frames[kCarriedOff - 1].stamp_s + double(i + 1) / 30.0;

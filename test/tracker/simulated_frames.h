@@ -16,22 +16,25 @@ struct Film {
   std::vector<SimulatedFrame> frames;
 };
 
-inline Film makeFilm(SimulatorOptions options) {
-  options.width = 320;
-  options.height = 240;
+/// A calm hand in a room.
+inline SimulatorOptions filmOptions(double duration_s, cv::Size size = {320, 240}) {
+  SimulatorOptions options;
+  options.duration_s = duration_s;
+  options.width = size.width;
+  options.height = size.height;
+  return options;
+}
+
+inline Film makeFilm(const SimulatorOptions& options) {
   Simulator simulator(options);
   Film film{simulator.camera(), {}};
   while (auto frame = simulator.next()) film.frames.push_back(*frame);
   return film;
 }
 
-/// Six seconds of a calm hand in a room, rendered once.
+/// Rendered once.
 inline const Film& slowFilm() {
-  static const Film film = [] {
-    SimulatorOptions options;
-    options.duration_s = 6.0;
-    return makeFilm(options);
-  }();
+  static const Film film = makeFilm(filmOptions(6.0));
   return film;
 }
 

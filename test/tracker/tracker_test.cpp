@@ -14,8 +14,8 @@
 namespace active_matching_slam {
 namespace {
 
-/// Largest error of a short film at 320 x 240, over the path. A slow start from rest leaves translation
-/// and rotation hard to tell apart, which dominates it.
+/// Largest error of a short film at 320 x 240, over the path. A slow start from rest leaves
+/// translation and rotation hard to tell apart, which dominates it.
 constexpr double kShareOfPath = 0.02;
 
 Tracker slowTracker(const TrackerOptions& options = {}) {
@@ -388,11 +388,10 @@ TEST(Tracker, RefusesAScaleThatIsNone) {
 }
 
 TEST(Tracker, NeverHoldsMoreFeaturesThanAllowed) {
-  SimulatorOptions simulation;
+  SimulatorOptions simulation = filmOptions(20.0);
   simulation.scene = "wall";
   simulation.motion = "sideways";
   simulation.rate_hz = 15.0;
-  simulation.duration_s = 20.0;
   const Film film = makeFilm(simulation);
   TrackerOptions options;
   options.map.features_per_frame = 25;
