@@ -15,8 +15,9 @@ add_test(NAME ${PROJECT_NAME}_documents
 set_tests_properties(${PROJECT_NAME}_documents PROPERTIES ENVIRONMENT
   AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
 
-# The commands of the documents as they stand there, and the advice on several machines.
-foreach(name commands machines)
+# The commands of the documents as they stand there, the advice on several machines, and whether
+# rosrun finds what the documents name.
+foreach(name commands machines rosrun)
   add_test(NAME ${PROJECT_NAME}_${name} COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE}
     ${CMAKE_CURRENT_SOURCE_DIR}/test/documents/${name}_test.py)
   set_tests_properties(${PROJECT_NAME}_${name} PROPERTIES ENVIRONMENT

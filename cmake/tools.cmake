@@ -23,7 +23,7 @@ endforeach()
 
 if(CATKIN_ENABLE_TESTING)
   file(GLOB tool_tests CONFIGURE_DEPENDS test/tools/*_test.cpp)
-  catkin_add_gtest(test_tools ${tool_tests} TIMEOUT 900
+  catkin_add_gtest(test_tools ${tool_tests}
     WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/test)
   target_include_directories(test_tools PRIVATE src)
   target_include_directories(test_tools SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
