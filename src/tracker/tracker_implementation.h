@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,8 +50,9 @@ class Tracker::Implementation {
   void follow(const cv::Mat& image, TrackedFrame* frame);
   void predict(double interval_s);
   void measure(const cv::Mat& image);
-  bool askToo(Matcher& matcher, double share, double least, double chi2_per_degree,
-              const cv::Mat& image, TrackedFrame* frame);
+  bool askToo(Matcher& matcher, const MeasurementPrior& prior, double share, double least,
+              double chi2_per_degree, const cv::Mat& image, TrackedFrame* frame);
+  std::optional<MeasurementPrior> guidedPrior(const cv::Mat& image) const;
   MatchOptions partOfBudget(double share) const;
   void match(const cv::Mat& image, TrackedFrame* frame);
   void correct(TrackedFrame* frame);
@@ -82,6 +84,7 @@ class Tracker::Implementation {
   std::string reason_;
   ScaleSource scale_source_ = ScaleSource::kFree;
   cv::Mat previous_image_;
+  Eigen::Isometry3d T_world_camera_before_ = Eigen::Isometry3d::Identity();  ///< of that image
   double last_stamp_s_ = 0.0;   ///< of the last image accepted
   double state_stamp_s_ = 0.0;  ///< of the filter's state
   double interval_s_ = 0.0;     ///< from the state before to this

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "active_matching_slam/image/image_motion.h"
 #include "active_matching_slam/image/warp.h"
+#include "active_matching_slam/tracker/image_motion_prior.h"
 #include "active_matching_slam/tracker/innovation_check.h"
 #include "tracker_implementation.h"
 
@@ -17,12 +19,14 @@ constexpr double kLeastShare = 0.1;    ///< of the matches expected: fewer are c
 constexpr int kFewPoorFrames = 2;      ///< after more, no second opinion
 constexpr double kMajority = 0.5;      ///< of the matches expected, for JCBB's to count
 constexpr double kClearlyMore = 1.25;  ///< matches, for RANSAC's to count
-constexpr double kFirstShare = 0.7;  ///< of the budget; a second opinion has the rest, a third less
+/// Of the budget: the first attempt, the same under the image's own motion, and each opinion.
+constexpr double kFirstShare = 0.6, kGuidedShare = 0.2, kOpinionShare = 0.1;
 constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
 
 }  // namespace
 
 void Tracker::Implementation::predict(double interval_s) {
+  T_world_camera_before_ = filter_.camera().poseWorldCamera();
   filter_.predict(std::min(interval_s, options_.max_frame_interval_s));
 }
 
@@ -65,14 +69,14 @@ void Tracker::Implementation::measure(const cv::Mat& image) {
   search_.beginFrame(image, templates_);
 }
 
-/// Asks another matcher, one that sees all matches at once, within a share of the frame's budget;
-/// a consensus of at least so many counts, if its joint squared distance (0 where the matcher has
-/// none) is at most `chi2_per_degree`.
-bool Tracker::Implementation::askToo(Matcher& matcher, double share, double least,
-                                     double chi2_per_degree, const cv::Mat& image,
+/// Asks again, under a prior of its own and within a share of the frame's budget; a consensus of at
+/// least so many counts, if its joint squared distance (0 where the matcher has none) is at most
+/// `chi2_per_degree`.
+bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& prior, double share,
+                                     double least, double chi2_per_degree, const cv::Mat& image,
                                      TrackedFrame* frame) {
   second_search_.beginFrame(image, templates_);
-  MatchResult second = matcher.match(prior_, second_search_, partOfBudget(share));
+  MatchResult second = matcher.match(prior, second_search_, partOfBudget(share));
   MatchStatistics& first = frame->matching.statistics;
   const double both_ms = second.statistics.total_ms + first.total_ms;
   const bool is_better =
@@ -87,6 +91,23 @@ bool Tracker::Implementation::askToo(Matcher& matcher, double share, double leas
   return is_better;
 }
 
+/// The prior once it is known how the image as a whole moved. Empty when that can't be told.
+std::optional<MeasurementPrior> Tracker::Implementation::guidedPrior(const cv::Mat& image) const {
+  if (previous_image_.size() != image.size()) return std::nullopt;
+  const Eigen::Isometry3d T_camera_world = T_world_camera_before_.inverse();
+  const int n = prior_.size();
+  std::vector<std::optional<Eigen::Vector2d>> before_px(n);
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector4d point = homogeneousPosition(*filter_.find(prior_.ids[i]));
+    before_px[i] = camera_.project(T_camera_world.linear() * point.head<3>() +
+                                   point.w() * T_camera_world.translation());
+  }
+  const auto motion =
+      estimateImageMotion(previous_image_, image, predictedImageMotion(prior_, before_px));
+  if (!motion) return std::nullopt;
+  return conditionOnImageMotion(prior_, before_px, *motion);
+}
+
 /// A slower camera, or a gap, leaves more time: the budget is meant for 30 Hz.
 MatchOptions Tracker::Implementation::partOfBudget(double share) const {
   MatchOptions options = options_.matching;
@@ -98,12 +119,14 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
   return options;
 }
 
-/// Asks the matcher, and another when far fewer features matched than should have. Where structure
-/// repeats in gates as wide as the image, a sequential matcher can lose the true hypothesis among
-/// hundreds of equals while all are still short: JCBB, which asks for the longest, is asked. Since
-/// that pairs whatever its test lets pass, it counts only if it agrees far better than it must. And
-/// a sequential matcher that follows something that moves by itself (a hand, a door) first, can end
-/// up with that and little else: RANSAC is asked.
+/// Asks the matcher, and again when far fewer features matched than should have:
+/// - The same matcher under the motion of the image as a whole, for a camera that was jerked.
+/// - Where structure repeats in gates as wide as the image, a sequential matcher can lose the true
+///   hypothesis among hundreds of equals while all are still short: JCBB, which asks for the
+///   longest. Since that pairs whatever its test lets pass, it counts only if it agrees far better
+///   than it must.
+/// - A sequential matcher that follows something that moves by itself (a hand, a door) first, can
+///   end up with that and little else: RANSAC.
 void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   if (!options_.second_opinion) {
     frame->matching = matcher_->match(prior_, search_, partOfBudget(1.0));
@@ -111,19 +134,29 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   }
   frame->matching = matcher_->match(prior_, search_, partOfBudget(kFirstShare));
   const double expected = map_.expectedMatches(candidates_);
-  const int matched = frame->matching.statistics.matched;
   if (expected < 8.0) return;
+  const auto isPoor = [&] {
+    const MatchStatistics& s = frame->matching.statistics;
+    return s.matched <= (s.ambiguous ? kPoorShareWhenAmbiguous : kPoorShare) * expected;
+  };
+  const auto clearlyMore = [&] {
+    return std::max(kClearlyMore * frame->matching.statistics.matched, kMajority * expected);
+  };
+  if (isPoor()) {
+    if (const auto guided = guidedPrior(image))
+      askToo(*matcher_, *guided, kGuidedShare, clearlyMore(), 0.0, image, frame);
+  }
   // After some poor frames the ellipses are so wide that chance alone makes a consensus.
   if (poor_frames_ <= kFewPoorFrames) {
-    double share = 1.0 - kFirstShare;
     bool is_settled = false;
-    if (frame->matching.statistics.ambiguous && matched <= kPoorShareWhenAmbiguous * expected) {
-      is_settled = askToo(*longest_matcher_, share, std::max(1.0 * matched, kMajority * expected),
-                          kCloseChi2PerDegree, image, frame);
-      share *= 0.5;
-    }
-    if (!is_settled && matched <= kPoorShare * expected)
-      askToo(*consensus_matcher_, share, kClearlyMore * matched, 0.0, image, frame);
+    const int matched = frame->matching.statistics.matched;
+    if (frame->matching.statistics.ambiguous && isPoor())
+      is_settled =
+          askToo(*longest_matcher_, prior_, kOpinionShare,
+                 std::max(1.0 * matched, kMajority * expected), kCloseChi2PerDegree, image, frame);
+    if (!is_settled && frame->matching.statistics.matched <= kPoorShare * expected)
+      askToo(*consensus_matcher_, prior_, kOpinionShare,
+             kClearlyMore * frame->matching.statistics.matched, 0.0, image, frame);
   }
   MatchResult& result = frame->matching;
   if (result.statistics.matched >= kLeastShare * expected) return;

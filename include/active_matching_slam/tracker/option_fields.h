@@ -25,7 +25,9 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matcher);
   visit(F{"learn_rates", "learn how often each feature is matched rightly and wrongly", true},
         o.learn_rates);
-  visit(F{"second_opinion", "ask jcbb or one_point_ransac too when far fewer match than should",
+  visit(F{"second_opinion",
+          "when far fewer match than should, match again by the motion of the whole image, jcbb, "
+          "one_point_ransac",
           true},
         o.second_opinion);
   visit(F{"structure", "maintain the graph of mutual information and the submaps", true},

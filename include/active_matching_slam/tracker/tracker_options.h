@@ -44,7 +44,7 @@ struct TrackerOptions {
   int minimum_matches = 4;               ///< fewer is 'too few'
   double reset_when_lost_after_s = 0.0;  ///< 0: never reset, keep looking for the map
   bool learn_rates = true;               ///< of each feature's true and false matches
-  bool second_opinion = true;            ///< ask another matcher too when few match
+  bool second_opinion = true;            ///< match again in other ways when few match
   bool structure = false;                ///< maintain the MI graph and the submaps
 };
 

@@ -1,0 +1,74 @@
+#include "active_matching_slam/tracker/image_motion_prior.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace active_matching_slam {
+namespace {
+
+/// The features' own ways, where they differ, pull the image's motion along by up to this share.
+constexpr double kShareOfSpread = 0.5;
+
+}  // namespace
+
+ImageMotion predictedImageMotion(const MeasurementPrior& prior,
+                                 const std::vector<std::optional<Eigen::Vector2d>>& before_px) {
+  ImageMotion motion;
+  int count = 0;
+  for (int i = 0; i < prior.size(); ++i) {
+    if (!before_px[i]) continue;
+    motion.shift_px += prior.mean(i) - *before_px[i];
+    ++count;
+  }
+  if (count > 0) motion.shift_px /= count;
+  return motion;
+}
+
+MeasurementPrior conditionOnImageMotion(
+    const MeasurementPrior& prior, const std::vector<std::optional<Eigen::Vector2d>>& before_px,
+    const ImageMotion& motion) {
+  std::vector<int> seen;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  for (int i = 0; i < prior.size(); ++i) {
+    if (!before_px[i]) continue;
+    seen.push_back(i);
+    centre += prior.mean(i);
+  }
+  const auto n = static_cast<double>(seen.size());
+  if (seen.size() < 3) return prior;
+  centre /= n;
+  double squared_radius = 0.0;  // mean
+  for (const int i : seen) squared_radius += (prior.mean(i) - centre).squaredNorm() / n;
+  const double radius = std::sqrt(squared_radius);
+  if (!(radius > 0.0)) return prior;
+
+  // Rows of A: shift u, shift v, turn times radius. The columns of B are what they do to a point.
+  Eigen::Matrix3Xd A = Eigen::Matrix3Xd::Zero(3, prior.z.size());
+  Eigen::VectorXd off = Eigen::VectorXd::Zero(prior.z.size());
+  for (const int i : seen) {
+    const Eigen::Vector2d arm = (prior.mean(i) - centre) / radius;
+    Eigen::Matrix<double, 2, 3> B;
+    B << 1.0, 0.0, -arm.y(), 0.0, 1.0, arm.x();
+    A.middleCols<2>(2 * i) = B.transpose() / n;
+    off.segment<2>(2 * i) = motion(*before_px[i]) - prior.mean(i);
+  }
+  const Eigen::Vector3d common = A * off;
+  const double spread = (off - n * A.transpose() * common).squaredNorm() / (2.0 * n);
+  const double variance =
+      motion.sigma_px * motion.sigma_px + kShareOfSpread * kShareOfSpread * spread;
+
+  Eigen::MatrixXd P = prior.S;  // without the noise of a match
+  P.diagonal().array() -= prior.noise_variance_px2;
+  const Eigen::MatrixX3d PA = P * A.transpose();
+  Eigen::Matrix3d V = A * PA;
+  V.diagonal().array() += variance;
+  const Eigen::LLT<Eigen::Matrix3d> factor(V);
+  MeasurementPrior conditioned = prior;
+  if (factor.info() != Eigen::Success) return conditioned;
+  conditioned.z += PA * factor.solve(common);
+  const Eigen::Matrix3Xd root = factor.matrixL().solve(PA.transpose());
+  conditioned.S -= root.transpose() * root;
+  return conditioned;
+}
+
+}  // namespace active_matching_slam
