@@ -61,7 +61,7 @@ Eigen::AlignedBox3d boundsOf(const Scene& scene) {
   for (const auto* lines : {&scene.estimate, &scene.truth})
     for (const auto& line : *lines)
       for (const Eigen::Vector3d& p : line) box.extend(p);
-  const double reach = 1.2 * box.sizes().maxCoeff();
+  const double reach = 2.5 * box.sizes().maxCoeff();
   const Eigen::AlignedBox3d limit(box.min().array() - reach, box.max().array() + reach);
   for (int axis = 0; axis < 3 && !scene.points.empty(); ++axis) {
     std::vector<double> values;
@@ -89,7 +89,7 @@ void drawView(const Scene& scene, int horizontal, int vertical, PlotCanvas* canv
       canvas->polyline(flat_line, colour, thickness);
     }
   };
-  drawLines(scene.truth, kTruthColour, 1);
+  drawLines(scene.truth, kTruthColour, 3);  // seen beside an estimate that covers it
   drawLines(scene.estimate, kEstimateColour, 1);
   canvas->ring(flat(scene.estimate.front().front()), 6.0, kEstimateColour);
   canvas->square(flat(scene.estimate.back().back()), 5.0, kEstimateColour);

@@ -84,6 +84,10 @@ std::optional<Relocalisation> Relocaliser::find(const cv::Mat& image, const Ekf&
   return result;
 }
 
+bool Relocaliser::canFind(const Ekf& filter, const FeatureMap& map) const {
+  return static_cast<int>(usableLandmarks(filter, map).size()) >= options_.minimum_inliers;
+}
+
 std::vector<Relocaliser::Landmark> Relocaliser::usableLandmarks(const Ekf& filter,
                                                                 const FeatureMap& map) const {
   std::vector<Landmark> landmarks;

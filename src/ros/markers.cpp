@@ -16,8 +16,8 @@ namespace {
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
 
-/// Beyond, an ellipsoid would only hide the scene: the feature is shown as a point or a ray.
-constexpr double kLargestEllipsoid_m = 2.0;
+/// In units of sceneSize(). A larger ellipsoid would have the viewer inside and hide the scene.
+constexpr double kLargestEllipsoid = 1.0;
 constexpr int kTrajectoryEllipsoids = 40;
 
 std_msgs::ColorRGBA color(double r, double g, double b, double a = 1.0) {
@@ -178,7 +178,7 @@ MarkerArray featureMarkers(const TrackedFrame& frame, const std_msgs::Header& he
       if (1.0 / std::max(feature.inverse_depth, 1e-9) > furthest) continue;
     } else {
       const Ellipsoid ellipsoid = threeSigmaEllipsoid(feature.covariance_world);
-      if (ellipsoid.semi_axes_m.maxCoeff() < kLargestEllipsoid_m * size)
+      if (ellipsoid.semi_axes_m.maxCoeff() < kLargestEllipsoid * size)
         markers.markers.push_back(
             ellipsoidMarker(header, "ellipsoids", static_cast<int>(feature.id),
                             feature.position_world, ellipsoid, statusColor(feature, 0.3)));
@@ -258,7 +258,9 @@ MarkerArray submapMarkers(const TrackedFrame& frame, int level, const std_msgs::
     for (const Eigen::Vector3d& position : positions) center += position / positions.size();
     label.pose.position = toPointMsg(center);
     label.scale.z = 0.09 * size;
-    label.color = submapColor(submap);
+    const std_msgs::ColorRGBA own = submapColor(submap);
+    // Lighter than the links that it lies on.
+    label.color = color(0.5 + 0.5 * own.r, 0.5 + 0.5 * own.g, 0.5 + 0.5 * own.b, 1.0);
     label.text = std::to_string(submap) + " (" + std::to_string(positions.size()) + ")";
     markers.markers.push_back(std::move(label));
   }
@@ -303,11 +305,15 @@ MarkerArray cameraMarkers(const TrackedFrame& frame, const CameraCalibration& ca
   if (line.points.size() >= 2) markers.markers.push_back(std::move(line));
 
   const std::size_t stride = 1 + trajectory.size() / kTrajectoryEllipsoids;
+  const double largest_m = kLargestEllipsoid * sceneSize(frame);
   int id = 0;
-  for (std::size_t i = 0; i < trajectory.size(); i += stride)
-    markers.markers.push_back(ellipsoidMarker(
-        header, "trajectory 3 sigma", id++, trajectory[i].position_world,
-        threeSigmaEllipsoid(trajectory[i].covariance_world), color(0.2, 0.85, 1.0, 0.25)));
+  for (std::size_t i = 0; i < trajectory.size(); i += stride) {
+    const Ellipsoid ellipsoid = threeSigmaEllipsoid(trajectory[i].covariance_world);
+    if (ellipsoid.semi_axes_m.maxCoeff() < largest_m)
+      markers.markers.push_back(ellipsoidMarker(header, "trajectory 3 sigma", id++,
+                                                trajectory[i].position_world, ellipsoid,
+                                                color(0.2, 0.85, 1.0, 0.25)));
+  }
   return markers;
 }
 

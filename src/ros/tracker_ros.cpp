@@ -113,10 +113,11 @@ void TrackerRos::noticeChanges(const TrackedFrame& frame, const ros::Time& stamp
   const bool time_jumped = frame.stamp_s < last_stamp_s_;
   if (session_.generation() != generation_ || frame.resets != resets_) {
     if (time_jumped)
-      ROS_WARN_STREAM("Time ran back by " << last_stamp_s_ - frame.stamp_s
-                                          << " s (a looped bag?): started anew");
+      restart_warning_.say("time", "Time ran back by " +
+                                       std::to_string(last_stamp_s_ - frame.stamp_s) +
+                                       " s (a looped bag?): started anew");
     else if (session_.generation() == generation_ && reset_cause_.empty())
-      ROS_WARN_STREAM("Started anew" << (frame.reason.empty() ? "" : ": " + frame.reason));
+      restart_warning_.say("Started anew" + (frame.reason.empty() ? "" : ": " + frame.reason));
     forgetPast(time_jumped);
   }
   generation_ = session_.generation();

@@ -39,7 +39,7 @@ bool TrackingSession::updateCamera(const CameraImage& image) {
 void TrackingSession::takeCalibration(const CameraCalibration& calibration) {
   if (tracker_ && sameImaging(calibration, calibration_)) return;
   auto tracker = std::make_unique<Tracker>(CameraModel(calibration), demandedOptions());
-  if (tracker_) ROS_WARN("camera_info has changed: started anew with an empty map");
+  if (tracker_) warning_.say("camera_info has changed: started anew with an empty map");
   tracker_ = std::move(tracker);
   calibration_ = calibration;
   ++generation_;

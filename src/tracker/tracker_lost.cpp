@@ -10,7 +10,6 @@ namespace {
 constexpr double kFoundSigmaPosition = 0.2;  ///< of a place found again, in scene depths
 constexpr double kFoundSigmaRotation = 0.1;  ///< [rad]
 constexpr int kFramesBetweenLooks = 4;       ///< a look through the whole map takes long
-constexpr int kLeastMap = 10;                ///< a smaller map can't be found again
 
 }  // namespace
 
@@ -50,8 +49,9 @@ void Tracker::Implementation::lose(const std::string& reason) {
 /// What becomes of an image while the camera is lost.
 void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
-  if (map_.size() < kLeastMap) {
-    reset("lost with a map of " + std::to_string(map_.size()) + " features: started anew");
+  // Lost soon after the start: nothing is known but directions.
+  if (!relocaliser_.canFind(filter_, map_)) {
+    reset("lost with a map that has too few features of known depth: started anew");
     return;
   }
   if (options_.reset_when_lost_after_s > 0.0 && lost_s >= options_.reset_when_lost_after_s) {

@@ -142,6 +142,17 @@ TEST(CameraMarkers, FrustumOpensTowardsWhereTheCameraLooks) {
       << "a lost camera claims no pose";
 }
 
+TEST(CameraMarkers, UncertaintyIsShownUnlessItWouldHideTheScene) {
+  TrackedFrame frame;
+  frame.features = {pointFeature(1, {0, 0, 2})};
+  const TrajectoryPoint known{Eigen::Vector3d::Zero(), 1e-4 * Eigen::Matrix3d::Identity()};
+  const TrajectoryPoint vague{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()};
+  const MarkerArray markers = cameraMarkers(frame, {}, {known, vague, known}, 0.2, worldHeader());
+  EXPECT_TRUE(find(markers, "trajectory", 0));
+  EXPECT_TRUE(find(markers, "trajectory 3 sigma", 1));
+  EXPECT_FALSE(find(markers, "trajectory 3 sigma", 2));
+}
+
 TEST(InformationMarkers, TreeLinksStandOutAndWeakLinksAreLeftOut) {
   TrackedFrame frame;
   frame.features = {pointFeature(1, {0, 0, 1}), pointFeature(2, {1, 0, 1}),

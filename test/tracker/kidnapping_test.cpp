@@ -146,6 +146,21 @@ TEST(Kidnapping, TheTrackerStartsAnewAfterTheTimeItIsGiven) {
   EXPECT_EQ(away.back()->state, TrackingState::kTracking) << "in a map of the new place";
 }
 
+TEST(Kidnapping, AMapThatCannotBeFoundAgainIsGivenUpAtOnce) {
+  Film film = slowFilm();
+  Tracker tracker(film.camera, {});
+  const int allowed = tracker.options().lost_after_frames;
+  for (int i = 1; i <= allowed + 1; ++i) {  // dark, and none repeats the one before
+    film.frames[i].image = cv::Mat(240, 320, CV_8UC1, cv::Scalar(0));
+    film.frames[i].image.at<std::uint8_t>(100, 100 + i) = 10;
+  }
+  const Frames frames = trackFrames(film, &tracker, 0, allowed + 12);
+  EXPECT_EQ(frames[allowed]->state, TrackingState::kLost) << "with a map of one image: no depth";
+  EXPECT_EQ(frames[allowed + 1]->resets, 1);
+  EXPECT_NE(frames[allowed + 1]->reason.find("depth"), std::string::npos);
+  EXPECT_EQ(frames.back()->state, TrackingState::kTracking) << "in a new map";
+}
+
 /// A map file that is removed at the end.
 class SavedMap : public testing::Test {
  protected:

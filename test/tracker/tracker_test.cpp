@@ -236,14 +236,18 @@ TEST(Tracker, IsNotFooledByNoise) {
 
 TEST(Tracker, StaysFiniteWhenItStartsOnNoise) {
   Tracker tracker = slowTracker();
+  int resets = 0, since_start = 0;
   for (int i = 0; i < 40; ++i) {
     std::shared_ptr<const TrackedFrame> frame;
     ASSERT_NO_THROW(frame = tracker.track(noiseImage(i), 1.0 + i / 30.0));
     EXPECT_TRUE(isFinite(*frame)) << "frame " << i;
-    if (i > 2) {
+    if (since_start > 2) {
       EXPECT_NE(frame->reason, "") << "frame " << i;
     }
+    since_start = frame->resets == resets ? since_start + 1 : 0;
+    resets = frame->resets;
   }
+  EXPECT_GT(resets, 0) << "a map of noise can't be found again";
 }
 
 TEST(Tracker, LearnsNothingFromARepeatedImage) {

@@ -47,6 +47,9 @@ class Relocaliser {
   std::optional<Relocalisation> find(const cv::Mat& image, const Ekf& filter,
                                      const FeatureMap& map) const;
 
+  /// Whether enough features have a known depth; else find() would search for ever in vain.
+  bool canFind(const Ekf& filter, const FeatureMap& map) const;
+
  private:
   struct Landmark {
     const MapFeature* feature;

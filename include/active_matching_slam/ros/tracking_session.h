@@ -6,6 +6,7 @@
 
 #include "active_matching_slam/camera/camera_calibration.h"
 #include "active_matching_slam/ros/camera_subscription.h"
+#include "active_matching_slam/ros/repeated_warning.h"
 #include "active_matching_slam/tracker/tracker.h"
 
 namespace active_matching_slam {
@@ -52,6 +53,7 @@ class TrackingSession {
   std::unique_ptr<Tracker> tracker_;
   int generation_ = 0;
   std::string fault_;
+  RepeatedWarning warning_;
 };
 
 }  // namespace active_matching_slam
