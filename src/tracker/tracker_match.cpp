@@ -22,6 +22,16 @@ constexpr double kClearlyMore = 1.25;  ///< matches, for RANSAC's to count
 /// Of the budget: the first attempt, the same under the image's own motion, and each opinion.
 constexpr double kFirstShare = 0.6, kGuidedShare = 0.2, kOpinionShare = 0.1;
 constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
+/// Pixels in all ellipses together beyond which the image's motion guides the first attempt.
+constexpr double kWideGatesPx = 2e5;
+
+/// In all 3-sigma ellipses together.
+double gatesPixels(const MeasurementPrior& prior) {
+  double pixels = 0.0;
+  for (int i = 0; i < prior.size(); ++i)
+    pixels += 9.0 * M_PI * std::sqrt(std::max(prior.covariance(i).determinant(), 0.0));
+  return pixels;
+}
 
 }  // namespace
 
@@ -120,7 +130,8 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
 }
 
 /// Asks the matcher, and again when far fewer features matched than should have:
-/// - The same matcher under the motion of the image as a whole, for a camera that was jerked.
+/// - The same matcher under the motion of the image as a whole, for a camera that was jerked. Where
+///   the ellipses are wide from the start, that comes first, and the filter's own prior second.
 /// - Where structure repeats in gates as wide as the image, a sequential matcher can lose the true
 ///   hypothesis among hundreds of equals while all are still short: JCBB, which asks for the
 ///   longest. Since that pairs whatever its test lets pass, it counts only if it agrees far better
@@ -132,7 +143,10 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     frame->matching = matcher_->match(prior_, search_, partOfBudget(1.0));
     return;
   }
-  frame->matching = matcher_->match(prior_, search_, partOfBudget(kFirstShare));
+  auto guided = gatesPixels(prior_) > kWideGatesPx ? guidedPrior(image) : std::nullopt;
+  const bool was_guided = guided.has_value();
+  frame->matching =
+      matcher_->match(was_guided ? *guided : prior_, search_, partOfBudget(kFirstShare));
   const double expected = map_.expectedMatches(candidates_);
   if (expected < 8.0) return;
   const auto isPoor = [&] {
@@ -143,8 +157,10 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     return std::max(kClearlyMore * frame->matching.statistics.matched, kMajority * expected);
   };
   if (isPoor()) {
-    if (const auto guided = guidedPrior(image))
-      askToo(*matcher_, *guided, kGuidedShare, clearlyMore(), 0.0, image, frame);
+    if (!was_guided) guided = guidedPrior(image);
+    if (guided)
+      askToo(*matcher_, was_guided ? prior_ : *guided, kGuidedShare, clearlyMore(), 0.0, image,
+             frame);
   }
   // After some poor frames the ellipses are so wide that chance alone makes a consensus.
   if (poor_frames_ <= kFewPoorFrames) {
@@ -156,7 +172,8 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
                  std::max(1.0 * matched, kMajority * expected), kCloseChi2PerDegree, image, frame);
     if (!is_settled && frame->matching.statistics.matched <= kPoorShare * expected)
       askToo(*consensus_matcher_, prior_, kOpinionShare,
-             kClearlyMore * frame->matching.statistics.matched, 0.0, image, frame);
+             std::max(kClearlyMore * frame->matching.statistics.matched, kLeastShare * expected),
+             0.0, image, frame);
   }
   MatchResult& result = frame->matching;
   if (result.statistics.matched >= kLeastShare * expected) return;

@@ -126,7 +126,9 @@ TEST_F(RecordedSequences, ActiveMatchingKeepsTheCheckerboardAtSevenAndAHalfHertz
 }
 
 TEST_F(RecordedSequences, PlainActiveSearchLosesTheCheckerboardAtSevenAndAHalfHertz) {
-  const TrackedRun run = trackAll("uzh_vamr_checkerboard", 4, withMatcher("active_search"), false);
+  TrackerOptions options = withMatcher("active_search");
+  options.second_opinion = false;
+  const TrackedRun run = trackAll("uzh_vamr_checkerboard", 4, options, false);
   EXPECT_LT(static_cast<int>(run.tracked.size()), run.frames);
 }
 
