@@ -10,6 +10,7 @@ MatchOptions traceOptions(UpdateRule rule) {
   MatchOptions options;
   options.update_rule = rule;
   options.keep_trace = true;
+  options.recount = false;
   return options;
 }
 

@@ -16,7 +16,11 @@ std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
                  std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
-    : joint_(joint), ledger_(ledger), options_(options), likelihoods_(std::move(likelihoods)) {
+    : prior_(prior),
+      joint_(joint),
+      ledger_(ledger),
+      options_(options),
+      likelihoods_(std::move(likelihoods)) {
   Hypothesis root;
   const std::size_t size = slot(joint.size());
   root.joint = joint.prior();
@@ -190,6 +194,7 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, const Child& born) {
   child.mean[slot(f)] = found;
   child.match[slot(f)] = match;
   child.share[slot(f)] = born.share;
+  child.log_merged = parent.log_merged + born.log_merged;
   std::vector<char> is_changed(child.mean.size(), 0);
   is_changed[slot(f)] = 1;
   for (const int t : touched) is_changed[slot(t)] = 1;
@@ -251,6 +256,7 @@ SearchOutcome Mixture::searchOnly(int g, int c) {
   Hypothesis& h = hypotheses_[slot(g)];
   const int f = h.candidates[slot(c)].feature;
   const SearchEllipse ellipse = h.ellipse(f);
+  if (ledger_.searchedPixels(f).size() == 0) first_searched_.push_back(f);
   SearchOutcome outcome = ledger_.search(f, ellipse);
   searched_.push_back({ellipse, h.lineage[slot(f)]});
   h.lineage[slot(f)] = static_cast<int>(searched_.size()) - 1;
@@ -258,8 +264,20 @@ SearchOutcome Mixture::searchOnly(int g, int c) {
   return outcome;
 }
 
-void Mixture::fuse(int g, int f, int match) {
+void Mixture::fuse(int g, int c, int match) {
   Hypothesis& h = hypotheses_[slot(g)];
+  const Hypothesis::Candidate& candidate = h.candidates[slot(c)];
+  const int f = candidate.feature;
+  double taken = 0.0, all = 0.0;
+  for (int m = 0; m < static_cast<int>(ledger_.matches(f).size()); ++m) {
+    const double p =
+        massOfPixel(ledger_.matches(f)[slot(m)].pixel, h.mean[slot(f)], h.covariance(f));
+    all += p;
+    if (m == match) taken = p;
+  }
+  const SearchLikelihood& of = likelihood(f);
+  const double missed = of.in * std::max(0.0, candidate.mass - all) + 1.0 - candidate.mass;
+  kept_ *= of.match * taken / (of.match * all + missed);
   Hypothesis fused = spawn(h, f, {match, h.log_weight});
   fused.id = h.id;
   fused.parent = h.parent;
@@ -267,6 +285,15 @@ void Mixture::fuse(int g, int f, int match) {
   fused.weight = h.weight;
   releaseEntries(h);
   h = std::move(fused);
+}
+
+std::vector<Explanation> Mixture::explanations() const {
+  std::vector<Explanation> explanations;
+  for (const Hypothesis& h : hypotheses_) explanations.push_back({&h, h.match, h.weight});
+  std::stable_sort(
+      explanations.begin(), explanations.end(),
+      [](const Explanation& a, const Explanation& b) { return a.probability > b.probability; });
+  return explanations;
 }
 
 }  // namespace active_matching_slam

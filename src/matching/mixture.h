@@ -53,6 +53,7 @@ struct Hypothesis {
   };
   int id = 0, parent = -1;
   double log_weight = 0.0, weight = 1.0;
+  double log_merged = 0.0;  ///< what merged siblings added to log_weight
   std::shared_ptr<const Conditional> joint;
   std::vector<Eigen::Vector2d> mean;    ///< F, the match for a fused feature [px]
   std::vector<int> match;               ///< F, -1: not fused
@@ -75,10 +76,18 @@ struct Hypothesis {
   }
 };
 
+/// A hypothesis, its matches completed by Mixture::recount, and its probability.
+struct Explanation {
+  const Hypothesis* hypothesis = nullptr;
+  std::vector<int> match;  ///< F
+  double probability = 0.0;
+};
+
 /// The mixture of Gaussians of Active Matching (Chli 2009, section 5.3): `sum_k lambda_k G(z_k,
 /// S_k)`, over any representation of the joint, with the two rules of update.
 class Mixture {
  public:
+  /// All but the likelihoods must outlive it.
   Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
           std::vector<SearchLikelihood> likelihoods, const MatchOptions& options);
 
@@ -105,10 +114,24 @@ class Mixture {
 
   /// Searches candidate c of hypothesis g and updates the mixture. `step` gets what came of it.
   void searchAndUpdate(int g, int c, MatchStep& step);
-  /// Fuses a match of feature f into g without asking the others; g keeps its id and weight.
-  void fuse(int g, int f, int match);
+  /// Fuses a match of the candidate's feature into g, just searched, without asking the others; g
+  /// keeps its id and weight. That it may be another match, or none, counts as dropped.
+  void fuse(int g, int c, int match);
+  /// The hypotheses as they are, heaviest first.
+  std::vector<Explanation> explanations() const;
   /// Searches candidate c of hypothesis g, and marks it as searched, without an update.
   SearchOutcome searchOnly(int g, int c);
+
+  /// The hypotheses, and those that were dropped while matches that others found could still be
+  /// theirs, judged anew by all that was found; the most probable first. The probabilities sum to
+  /// less than 1 by that of what was dropped otherwise.
+  ///
+  /// The weights of the mixture alone are no probabilities. To a hypothesis that is not searched
+  /// itself they credit what others found in its ellipses as if features were independent, though
+  /// the place of one tells those of all others. So the longer it waits the lighter it gets, until
+  /// it is dropped. Here it takes up what was found, match by match, each expected where the ones
+  /// before tell: the evidence is the joint density of all its matches.
+  std::vector<Explanation> recount() const;
 
   int mostGaussians() const { return most_gaussians_; }
   bool wasCapped() const { return was_capped_; }
@@ -121,9 +144,31 @@ class Mixture {
   struct Child {
     int match;
     double log_weight;
-    double share = 1.0;  ///< of its own in log_weight
+    double share = 1.0;       ///< of its own in log_weight
+    double log_merged = 0.0;  ///< what merged siblings added to log_weight
   };
 
+  /// How well a hypothesis explains what was found for some features, relative to clutter alone.
+  struct Evidence {
+    std::vector<int> match;    ///< F, completed
+    double log_claimed = 0.0;  ///< by these matches
+    double log_any = 0.0;      ///< by all that the hypothesis allows
+  };
+
+  /// Whether others found matches that may be its own.
+  bool recounts() const {
+    return options_.recount && options_.update_rule == UpdateRule::kIncremental;
+  }
+  bool lags(const Hypothesis& h) const;
+  /// What was found for a feature, as a hypothesis that expects it so sees it.
+  struct View {
+    SearchEllipse expected;
+    int best = -1;         ///< the likeliest match that it may claim
+    double of_best = 0.0;  ///< its likelihood, relative to clutter alone
+    double any = 1.0;      ///< likelihood of all that was found
+  };
+  View viewOf(const Hypothesis& h, int f, const SearchEllipse& expected) const;
+  Evidence evidenceOf(const Hypothesis& h, const std::vector<int>& features) const;
   bool liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const;
   void addCandidate(Hypothesis& h, int f) const;
   double pixelMass(Hypothesis& h, int f);
@@ -143,6 +188,7 @@ class Mixture {
                      const Hypothesis::Candidate& candidate) const;
   void complete(PairTerm& term, const Hypothesis::Candidate& candidate, double child) const;
 
+  const ProperPrior& prior_;
   const Joint& joint_;
   SearchLedger& ledger_;
   const MatchOptions& options_;
@@ -161,6 +207,10 @@ class Mixture {
   int next_id_ = 1;
   int most_gaussians_ = 1;
   bool was_capped_ = false;
+  // For recount()
+  std::vector<int> first_searched_;  // features, in order
+  std::vector<Hypothesis> aside_;    // dropped while they lagged
+  double kept_ = 1.0;                // probability of all that was not dropped otherwise
 };
 
 }  // namespace active_matching_slam

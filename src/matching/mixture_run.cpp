@@ -141,7 +141,7 @@ void MixtureRun::acceptNearest(MatchResult& result) {
       nearest2 = d2;
     }
     if (nearest >= 0) {
-      mixture_.fuse(dominant, feature, nearest);
+      mixture_.fuse(dominant, next.candidate, nearest);
       step.spawned.push_back(nearest);
     }
     record(std::move(step), result);
@@ -169,45 +169,54 @@ void MixtureRun::record(MatchStep step, MatchResult& result) const {
   if (options_.keep_trace) result.trace.push_back(std::move(step));
 }
 
-std::vector<int> MixtureRun::matchesOf(const Hypothesis& h) const {
+std::vector<int> MixtureRun::matchesOf(const Explanation& e) const {
   std::vector<int> matches(slot(prior_.size() + prior_.leftOut()), -1);
   for (int f = 0; f < prior_.size(); ++f)
-    if (h.share[slot(f)] >= options_.merge_share)
-      matches[slot(prior_.original(f))] = h.match[slot(f)];
+    if (e.hypothesis->share[slot(f)] >= options_.merge_share)
+      matches[slot(prior_.original(f))] = e.match[slot(f)];
   return matches;
 }
 
 void MixtureRun::report(MatchResult& result) const {
-  const Hypothesis& accepted = mixture_.hypotheses()[slot(mixture_.heaviest())];
+  const bool recounts = options_.recount && options_.update_rule == UpdateRule::kIncremental;
+  const std::vector<Explanation> all =
+      recounts && !ledger_.isOverBudget() ? mixture_.recount() : mixture_.explanations();
+  const Explanation& accepted = all.front();
   MatchStatistics& statistics = result.statistics;
   statistics.max_gaussians = mixture_.mostGaussians();
-  statistics.information_bits_end = informationLeft(accepted);
-  statistics.accepted_weight = accepted.weight;
-  std::vector<const Hypothesis*> ordered;
-  for (const Hypothesis& h : mixture_.hypotheses()) ordered.push_back(&h);
-  std::stable_sort(ordered.begin(), ordered.end(),
-                   [](const Hypothesis* a, const Hypothesis* b) { return a->weight > b->weight; });
-  for (const Hypothesis* h : ordered)
-    result.hypotheses.push_back({h->id, h->parent, h->weight, matchesOf(*h)});
+  statistics.accepted_weight = accepted.probability;
+  for (int f = 0; f < prior_.size(); ++f)
+    if (accepted.match[slot(f)] < 0)
+      statistics.information_bits_end += accepted.hypothesis->joint->marginal(f).information_bits;
+  statistics.dropped_probability = 1.0;
+  for (const Explanation& e : all) {
+    if (e.probability < options_.prune_weight && &e != &accepted) break;
+    result.hypotheses.push_back(
+        {e.hypothesis->id, e.hypothesis->parent, e.probability, matchesOf(e)});
+    statistics.dropped_probability -= e.probability;
+  }
+  statistics.dropped_probability = std::max(statistics.dropped_probability, 0.0);
   result.match_of_feature = result.hypotheses.front().match_of_feature;
-  statistics.ambiguous = accepted.weight < options_.ambiguous_below_weight;
+  statistics.ambiguous = accepted.probability < options_.ambiguous_below_weight;
   if (!statistics.ambiguous) return;
-  // Strong are the heaviest hypotheses that together reach the weight asked for.
-  double together = accepted.weight;
-  for (std::size_t k = 1; k < ordered.size() && together < options_.ambiguous_below_weight; ++k) {
-    together += ordered[k]->weight;
+  // Strong are the most probable hypotheses that together reach the probability asked for.
+  double together = accepted.probability;
+  for (std::size_t k = 1;
+       k < result.hypotheses.size() && together < options_.ambiguous_below_weight; ++k) {
+    together += all[k].probability;
     for (int f = 0; f < prior_.size(); ++f) {
       int& match = result.match_of_feature[slot(prior_.original(f))];
-      if (match >= 0 && !agrees(*ordered[k], f, match)) match = -1;
+      if (match >= 0 && !agrees(all[k], f, match)) match = -1;
     }
   }
 }
 
-/// Whether `h` has accepted the match, or would find it where it has not looked yet.
-bool MixtureRun::agrees(const Hypothesis& h, int feature, int match) const {
+/// Whether `e` has accepted the match, or would find it where it has not looked yet.
+bool MixtureRun::agrees(const Explanation& e, int feature, int match) const {
+  const Hypothesis& h = *e.hypothesis;
   const int c = h.candidate_of[slot(feature)];
-  if (h.isFused(feature) || c < 0 || !h.candidates[slot(c)].open)
-    return h.match[slot(feature)] == match;
+  if (e.match[slot(feature)] >= 0 || c < 0 || !h.candidates[slot(c)].open)
+    return e.match[slot(feature)] == match;
   return mahalanobisSquared(h.ellipse(feature), ledger_.matches(feature)[slot(match)].pixel) <=
          kEllipseRadius2;
 }

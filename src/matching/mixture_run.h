@@ -29,11 +29,11 @@ class MixtureRun {
   void latch();
   bool isFinished() const;
   void acceptNearest(MatchResult& result);
-  bool agrees(const Hypothesis& h, int feature, int match) const;
+  bool agrees(const Explanation& e, int feature, int match) const;
   MatchStep begin(const Measurement& measurement) const;
   void record(MatchStep step, MatchResult& result) const;
   void report(MatchResult& result) const;
-  std::vector<int> matchesOf(const Hypothesis& h) const;
+  std::vector<int> matchesOf(const Explanation& e) const;
 
   const ProperPrior& prior_;
   SearchLedger& ledger_;

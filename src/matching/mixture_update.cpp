@@ -15,6 +15,8 @@ constexpr double kLeastLikelihood = 1e-9;
 /// Logarithm of the odds that the better of two near matches is the true one, by the difference of
 /// their similarities.
 constexpr double kScoreCredit = 20.0;
+/// Dropped hypotheses that are kept for the recount, so many at most.
+constexpr std::size_t kMostAside = 32;
 
 std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
@@ -165,7 +167,9 @@ void Mixture::mergeSiblings(int g, int f, std::vector<Child>& children) const {
     }
     const double best = credits[static_cast<std::size_t>(near - kept.begin())];
     near->share = 1.0 / (1.0 / near->share + std::exp(credit(child) - best));
-    near->log_weight += std::log1p(std::exp(child.log_weight - near->log_weight));
+    const double more = std::log1p(std::exp(child.log_weight - near->log_weight));
+    near->log_weight += more;
+    near->log_merged += more;
   }
   children = std::move(kept);
 }
@@ -205,6 +209,8 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
   };
   normalise();
   record(step.weights);
+  std::vector<double> weights;
+  for (const Entry& e : entries) weights.push_back(e.weight);
   double heaviest = 0.0;
   for (const Entry& e : entries) heaviest = std::max(heaviest, e.weight);
   double least = std::min(options_.prune_weight, heaviest);
@@ -225,6 +231,8 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
     entries = std::move(ordered);
     was_capped_ = true;
   }
+  double kept = 0.0;
+  for (const Entry& e : entries) kept += e.weight;
   normalise();
   record(step.pruned);
 
@@ -242,6 +250,12 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
     e.index = static_cast<int>(hypotheses_.size()) - 1;
   }
   if (!lives[slot(g)]) releaseEntries(hypotheses_[slot(g)]);
+  for (int k = 0; k < old_count && recounts(); ++k) {
+    if (lives[slot(k)] || aside_.size() >= kMostAside || !lags(hypotheses_[slot(k)])) continue;
+    aside_.push_back(std::move(hypotheses_[slot(k)]));
+    kept += weights[slot(k)];
+  }
+  kept_ *= kept;
   std::vector<Hypothesis> next;
   next.reserve(entries.size());
   for (const Entry& e : entries) {

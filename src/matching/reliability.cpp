@@ -77,8 +77,8 @@ std::vector<ReliabilityBin> Reliability::bins() const {
   return bins;
 }
 
-Reliability measureReliability(const std::string& matcher, int frames, int bins,
-                               std::uint64_t seed) {
+Reliability measureReliability(const std::string& matcher, int frames, int bins, std::uint64_t seed,
+                               MatchOptions options) {
   std::vector<ProblemSimulator> simulators;
   for (const double clutter : {2e-5, 1e-4, 4e-4}) {
     SimulatedProblemOptions options;
@@ -89,8 +89,6 @@ Reliability measureReliability(const std::string& matcher, int frames, int bins,
   fast.false_positive = 1e-4;
   fast.rate_hz = 15.0;
   simulators.emplace_back(fast, ++seed);
-  MatchOptions options;
-  options.max_gaussians = 64;
   options.keep_trace = true;
   const auto instance = createMatcher(matcher);
   Reliability reliability(bins);

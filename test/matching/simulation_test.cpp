@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "active_matching_slam/information/chow_liu_tree.h"
@@ -56,15 +57,36 @@ TEST(ActiveMatching, IsRightMoreOftenThanJcbbWhereStructureRepeats) {
   EXPECT_GT(scoreOf("active", options, 500).right, scoreOf("jcbb", options, 500).right);
 }
 
-TEST(ActiveMatching, WeightOfTheAcceptedHypothesisIsAProbability) {
-  constexpr double kSystematic = 0.03;  // of rule incremental: a child keeps its parent's view
-  const auto bins = measureReliability("active", 3000, 5, 20).bins();
+/// Whether what is claimed is what happens, in every bin of weights and in all frames together.
+void expectProbabilities(const std::string& matcher, int frames, const MatchOptions& options) {
+  const auto bins = measureReliability(matcher, frames, 10, 20, options).bins();
+  double claimed = 0.0, right = 0.0, variance = 0.0;
   for (const ReliabilityBin& bin : bins) {
-    if (bin.frames < 30) continue;
-    EXPECT_NEAR(bin.mean_weight, bin.share_right, 3.0 * bin.sigma + kSystematic)
-        << bin.frames << " frames with weights about " << bin.mean_weight;
+    claimed += bin.frames * bin.mean_weight;
+    right += bin.frames * bin.share_right;
+    variance += std::pow(bin.frames * bin.sigma, 2);
+    if (bin.frames < 10) continue;
+    EXPECT_NEAR(bin.mean_weight, bin.share_right, 3.0 * bin.sigma)
+        << matcher << ", " << bin.frames << " frames";
   }
-  EXPECT_GT(bins.back().frames, 1000);
+  EXPECT_NEAR(claimed, right, 3.0 * std::sqrt(variance)) << matcher;
+  EXPECT_GT(bins.back().frames, frames / 2);
+  EXPECT_LT(bins.back().frames, 0.95 * frames) << "too easy to tell anything";
+}
+
+TEST(MixtureMatching, WeightOfTheAcceptedHypothesisIsAProbability) {
+  for (const char* matcher : {"active", "fast_active", "chow_liu"})
+    expectProbabilities(matcher, 4000, {});
+}
+
+TEST(MixtureMatching, WeightIsAProbabilityHoweverMuchIsDroppedOrLatched) {
+  MatchOptions options;
+  options.prune_weight = 0.02;
+  expectProbabilities("active", 4000, options);
+  options = {};
+  options.max_gaussians = 5;
+  options.latch_information_bits = 0.1;
+  expectProbabilities("active", 4000, options);
 }
 
 TEST(ChowLiuMatching, EqualsActiveMatchingOnTheCovarianceOfTheTree) {
@@ -74,6 +96,7 @@ TEST(ChowLiuMatching, EqualsActiveMatchingOnTheCovarianceOfTheTree) {
   ProblemSimulator simulator(options, 5);
   MatchOptions match_options;
   match_options.keep_trace = true;
+  match_options.recount = false;  // which knows the whole covariance
   for (int n = 0; n < 20; ++n) {
     SimulatedProblem problem = simulator.next();
     PointListSearch tree_search = problem.search(), dense_search = problem.search();

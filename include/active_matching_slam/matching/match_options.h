@@ -21,7 +21,10 @@ struct MatchOptions {
   // Mixture of Gaussians: active, fast_active, chow_liu.
   UpdateRule update_rule = UpdateRule::kIncremental;
   double prune_weight = 0.001;  ///< Gaussians below are dropped, [0, 1)
-  int max_gaussians = 0;        ///< cap on the live mixture; the lightest go first; 0: no cap
+  /// Rule incremental: at the end all hypotheses, some of the dropped ones too, are judged anew by
+  /// all that was found, and the most probable one is accepted; else the heaviest Gaussian is.
+  bool recount = true;
+  int max_gaussians = 0;  ///< cap on the live mixture; the lightest go first; 0: no cap
   /// Siblings, Gaussians born of one search, become one where they differ by less than so many
   /// sigma in what they expect of every other feature; 0: never. The better one stays, with the
   /// weight of both.

@@ -13,6 +13,7 @@ namespace active_matching_slam {
 struct MatchHypothesis {
   int gaussian = -1;  ///< id in the trace; parent as there
   int parent = -1;
+  /// By the recount; without one, the weight in the mixture.
   double probability = 0.0;
   std::vector<int> match_of_feature;  ///< F: index into FeatureSearch::matches(feature), or -1
 };
@@ -53,11 +54,12 @@ struct MatchStatistics {
   int max_gaussians = 0;                ///< most live at once, before pruning
   double information_bits_start = 0.0;  ///< sum over features of I(z_i; rest) in the prior
   double information_bits_end = 0.0;    ///< what the accepted hypothesis left unmeasured
-  double accepted_weight = 1.0;  ///< probability of the accepted hypothesis (1 for baselines)
-  bool ambiguous = false;        ///< accepted_weight below options.ambiguous_below_weight
-  bool cut_short = false;        ///< a budget or a cap ended the search early
-  int degenerate_features = 0;   ///< left out because their prediction was not a proper Gaussian
-  std::int64_t nodes = 0;        ///< jcbb: nodes visited; one_point_ransac: hypotheses
+  double accepted_weight = 1.0;      ///< probability of the accepted hypothesis (1 for baselines)
+  double dropped_probability = 0.0;  ///< of the hypotheses that the result does not list
+  bool ambiguous = false;            ///< accepted_weight below options.ambiguous_below_weight
+  bool cut_short = false;            ///< a budget or a cap ended the search early
+  int degenerate_features = 0;  ///< left out because their prediction was not a proper Gaussian
+  std::int64_t nodes = 0;       ///< jcbb: nodes visited; one_point_ransac: hypotheses
   int inliers = 0;            ///< one_point_ransac: low-innovation inliers, the hypothesis included
   double mahalanobis2 = 0.0;  ///< jcbb: joint squared distance of all pairings
   // Durations [ms]

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "active_matching_slam/matching/match_options.h"
 #include "active_matching_slam/matching/match_result.h"
 #include "active_matching_slam/matching/simulated_problem.h"
 
@@ -44,7 +45,7 @@ class Reliability {
 
 /// Frames of four kinds in turn, with little clutter, with much, with very much, and at half the
 /// frame rate, through a mixture matcher. Deterministic in `seed`.
-Reliability measureReliability(const std::string& matcher, int frames, int bins,
-                               std::uint64_t seed);
+Reliability measureReliability(const std::string& matcher, int frames, int bins, std::uint64_t seed,
+                               MatchOptions options = {});
 
 }  // namespace active_matching_slam

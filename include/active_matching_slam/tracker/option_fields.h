@@ -112,6 +112,8 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matching.update_rule);
   visit(F{"matching/prune_weight", "Gaussians below this weight are dropped", true},
         o.matching.prune_weight, 0.0, 0.5);
+  visit(F{"matching/recount", "judge all hypotheses anew at the end, dropped ones too", true},
+        o.matching.recount);
   visit(F{"matching/max_gaussians", "cap on the mixture; 0: none", true}, o.matching.max_gaussians,
         0, 100000);
   visit(
