@@ -168,6 +168,8 @@ class Mixture {
     double any = 1.0;      ///< likelihood of all that was found
   };
   View viewOf(const Hypothesis& h, int f, const SearchEllipse& expected) const;
+  std::vector<int> contradictions(const Hypothesis& a, const Hypothesis& b,
+                                  std::size_t skipped) const;
   Evidence evidenceOf(const Hypothesis& h, const std::vector<int>& features) const;
   bool liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const;
   void addCandidate(Hypothesis& h, int f) const;

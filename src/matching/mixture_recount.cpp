@@ -11,19 +11,20 @@
 namespace active_matching_slam {
 namespace {
 
-/// Features, the first that were searched, on which hypotheses are compared. What comes later has
-/// such small ellipses that all who agree on these agree on it too.
-constexpr std::size_t kCompared = 24;
+/// A hypothesis is compared with the heaviest on so many features, those that were searched first,
+/// and on so many of those where the two contradict each other. All others have such small ellipses
+/// that who agrees on these agrees on them too.
+constexpr std::size_t kCompared = 16, kContradicted = 8;
+/// Others are predicted from so many at most.
+constexpr std::size_t kMostKnown = 32;
 
 std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 /// A Gaussian of image points of which one after the other becomes known.
 class PredictionChain {
  public:
-  PredictionChain(const ProperPrior& prior, std::size_t most)
-      : prior_(prior),
-        factor_(2 * static_cast<Eigen::Index>(most), 2 * static_cast<Eigen::Index>(most)),
-        whitened_(2 * static_cast<Eigen::Index>(most)) {}
+  explicit PredictionChain(const ProperPrior& prior)
+      : prior_(prior), factor_(2 * kMostKnown, 2 * kMostKnown), whitened_(2 * kMostKnown) {}
 
   /// Where the feature is expected, given those that are known.
   SearchEllipse predict(int feature) {
@@ -37,8 +38,9 @@ class PredictionChain {
             prior_.covariance(feature) - cross_.transpose() * cross_};
   }
 
-  /// After predict() of the same feature.
+  /// After predict() of the same feature. What comes after kMostKnown changes little.
   void learn(int feature, const SearchEllipse& predicted, const Eigen::Vector2d& pixel) {
+    if (known_.size() >= kMostKnown) return;
     const auto n = 2 * static_cast<Eigen::Index>(known_.size());
     const Eigen::Matrix2d root = predicted.covariance.llt().matrixL();
     factor_.block(n, 0, 2, n) = cross_.transpose();
@@ -73,7 +75,7 @@ Mixture::Evidence Mixture::evidenceOf(const Hypothesis& h, const std::vector<int
   Evidence evidence;
   evidence.match = h.match;
   evidence.log_claimed = h.log_merged;
-  PredictionChain chain(prior_, features.size());
+  PredictionChain chain(prior_);
   std::vector<int> open;
   for (const int f : features) {
     const int m = h.match[slot(f)];
@@ -137,31 +139,52 @@ Mixture::View Mixture::viewOf(const Hypothesis& h, int f, const SearchEllipse& e
   return seen;
 }
 
+/// Features, not among the first `skipped` searched, for which one accepts a match that the other
+/// denies.
+std::vector<int> Mixture::contradictions(const Hypothesis& a, const Hypothesis& b,
+                                         std::size_t skipped) const {
+  const auto denies = [&](const Hypothesis& h, int f, int match) {
+    return h.isFused(f) ? h.match[slot(f)] != match
+                        : liesInLineage(h, f, ledger_.matches(f)[slot(match)].pixel);
+  };
+  std::vector<int> features;
+  for (std::size_t i = skipped; i < first_searched_.size(); ++i) {
+    const int f = first_searched_[i];
+    if (features.size() >= kContradicted) break;
+    if ((a.isFused(f) && denies(b, f, a.match[slot(f)])) ||
+        (b.isFused(f) && denies(a, f, b.match[slot(f)])))
+      features.push_back(f);
+  }
+  return features;
+}
+
 std::vector<Explanation> Mixture::recount() const {
-  if (hypotheses_.size() + aside_.size() == 1)
-    return {{&hypotheses_.front(), hypotheses_.front().match, kept_}};
-  std::vector<int> compared = first_searched_;
-  if (compared.size() > kCompared) compared.resize(kCompared);
+  const Hypothesis& leader = hypotheses_[slot(heaviest())];
+  if (hypotheses_.size() + aside_.size() == 1) return {{&leader, leader.match, kept_}};
+  const std::vector<int> first(first_searched_.begin(),
+                               first_searched_.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                             first_searched_.size(), kCompared)));
+  const Evidence of_leader = evidenceOf(leader, first);
   std::vector<Explanation> explanations;
-  std::vector<double> any;
+  double sum = 0.0;
   const auto judge = [&](const Hypothesis& h) {
-    Evidence evidence = evidenceOf(h, compared);
-    explanations.push_back({&h, std::move(evidence.match), evidence.log_claimed});
-    any.push_back(evidence.log_any);
+    std::vector<int> compared = contradictions(leader, h, first.size());
+    const bool on_first = compared.empty();
+    compared.insert(compared.begin(), first.begin(), first.end());
+    Evidence evidence = &h == &leader ? of_leader : evidenceOf(h, compared);
+    const double base = on_first ? of_leader.log_any : evidenceOf(leader, compared).log_any;
+    explanations.push_back({&h, std::move(evidence.match), std::exp(evidence.log_claimed - base)});
+    sum += std::exp(evidence.log_any - base);
   };
   for (const Hypothesis& h : hypotheses_) judge(h);
   for (const Hypothesis& h : aside_) judge(h);
-  const double most = *std::max_element(any.begin(), any.end());
-  double sum = 0.0;
-  for (const double log_any : any) sum += std::exp(log_any - most);
-  for (Explanation& e : explanations) e.probability = kept_ * std::exp(e.probability - most) / sum;
+  for (Explanation& e : explanations) e.probability *= kept_ / sum;
   std::stable_sort(
       explanations.begin(), explanations.end(),
       [](const Explanation& a, const Explanation& b) { return a.probability > b.probability; });
   // One that has waited takes up what was found for the other features too.
   Explanation& accepted = explanations.front();
-  if (accepted.hypothesis != &hypotheses_[slot(heaviest())] &&
-      first_searched_.size() > compared.size())
+  if (accepted.hypothesis != &leader && first_searched_.size() > first.size())
     accepted.match = evidenceOf(*accepted.hypothesis, first_searched_).match;
   return explanations;
 }
