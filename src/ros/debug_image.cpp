@@ -142,13 +142,10 @@ void drawLinks(const TrackedFrame& frame, double minimum_bits, Canvas* canvas) {
 
 /// The matcher's own tree where it has one, else the map's.
 void drawTree(const TrackedFrame& frame, Canvas* canvas) {
-  const auto feature = [&](int candidate) -> const TrackedFeature& {
-    return frame.features[frame.candidates[candidate]];
-  };
-  const int count = static_cast<int>(frame.candidates.size());
+  const int count = frame.prior.size();
   for (const auto& [i, j] : frame.matching.tree_edges)
     if (i >= 0 && j >= 0 && i < count && j < count)
-      canvas->line(feature(i).predicted_px, feature(j).predicted_px, kGold);
+      canvas->line(frame.prior.mean(i), frame.prior.mean(j), kGold);
   if (!frame.matching.tree_edges.empty()) return;
   for (const VisibleLink& link : visibleLinks(frame))
     if (link.in_tree) drawLink(frame, link, kGold, 1, canvas);
@@ -281,9 +278,8 @@ cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options, in
   if (options.matches) drawMatches(frame, &canvas);
   if (options.submaps) drawSubmaps(frame, submap_level, &canvas);
   if (options.information)
-    for (int candidate : frame.candidates) {
-      const TrackedFeature& feature = frame.features[candidate];
-      if (feature.information_bits <= 0.0) continue;  // this matcher has no use for it
+    for (const TrackedFeature& feature : frame.features) {
+      if (feature.information_bits <= 0.0) continue;  // not predicted, or of no use to the matcher
       char bits[16];
       std::snprintf(bits, sizeof bits, "%.1f", feature.information_bits);
       canvas.label(feature.predicted_px, bits, kWhite);

@@ -139,12 +139,13 @@ ams_msgs::MatchHypotheses toHypothesesMsg(const TrackedFrame& frame,
     out.probability = finiteOrZero(hypothesis.probability);
     out.gaussian = hypothesis.gaussian;
     out.parent = hypothesis.parent;
+    // By the prior: a feature that was retired after the matching is no longer in `features`.
     const std::size_t count = std::min(
-        {hypothesis.match_of_feature.size(), frame.candidates.size(), frame.matches.size()});
+        {hypothesis.match_of_feature.size(), frame.prior.ids.size(), frame.matches.size()});
     for (std::size_t i = 0; i < count; ++i) {
       const int match = hypothesis.match_of_feature[i];
       if (match < 0 || match >= static_cast<int>(frame.matches[i].size())) continue;
-      out.feature_ids.push_back(frame.features[frame.candidates[i]].id);
+      out.feature_ids.push_back(frame.prior.ids[i]);
       out.u.push_back(static_cast<float>(frame.matches[i][match].pixel.x()));
       out.v.push_back(static_cast<float>(frame.matches[i][match].pixel.y()));
     }

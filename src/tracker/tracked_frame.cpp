@@ -89,11 +89,7 @@ void Tracker::Implementation::describe(TrackedFrame* frame) const {
     const auto it =
         std::lower_bound(frame->features.begin(), frame->features.end(), prior_.ids[i],
                          [](const TrackedFeature& f, FeatureId id) { return f.id < id; });
-    if (it == frame->features.end() || it->id != prior_.ids[i]) {
-      frame->candidates.push_back(-1);  // retired at the end of this frame
-      continue;
-    }
-    frame->candidates.push_back(static_cast<int>(it - frame->features.begin()));
+    if (it == frame->features.end() || it->id != prior_.ids[i]) continue;  // retired by now
     it->predicted_px = prior_.mean(i);
     it->innovation_covariance_px2 = prior_.covariance(i);
     const auto& matches = frame->matches[i];

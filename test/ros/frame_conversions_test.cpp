@@ -105,10 +105,10 @@ TEST(PointCloud, HoldsPositionSigmaIdAndSubmap) {
   EXPECT_EQ(9, *submap);
 }
 
-TEST(Hypotheses, NameTheFeaturesTheyMatchAndWhere) {
+TEST(Hypotheses, NameTheFeaturesTheyMatchAndWhereThoughOneIsRetiredByNow) {
   TrackedFrame frame;
-  frame.features = {matchedFeature(5), matchedFeature(9)};
-  frame.candidates = {1, 0};
+  frame.features = {matchedFeature(5)};
+  frame.prior.ids = {9, 5};
   frame.matches = {{{{30, 40}, 0.9, 0}, {{50, 60}, 0.8, 1}}, {}};
   MatchHypothesis hypothesis;
   hypothesis.probability = 0.75;

@@ -281,6 +281,20 @@ TEST(DebugImage, ShowsLinksByBitsAndSubmapsInTheirColoursWhenAsked) {
   EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(image, 0, 2)) << "not of the tree";
 }
 
+TEST(DebugImage, DrawsTheMatchersTreeThoughAFeatureIsRetiredByNow) {
+  TrackedFrame frame;
+  frame.image = cv::Mat(480, 640, CV_8UC1, cv::Scalar(0));
+  frame.features = {pointFeature(2, {0, 0, 1})};
+  frame.prior.ids = {1, 2};
+  frame.prior.z.resize(4);
+  frame.prior.z << 100, 100, 300, 100;
+  frame.matching.tree_edges = {{0, 1}};
+  DrawOptions tree;
+  tree.predictions = tree.searches = tree.matches = tree.status = false;
+  tree.tree = tree.information = true;
+  EXPECT_NE(cv::Vec3b(0, 0, 0), drawDebugImage(frame, tree, 0).at<cv::Vec3b>(100, 200));
+}
+
 TEST(DebugImage, SurvivesWhatIsNotFinite) {
   TrackedFrame frame;
   frame.image = cv::Mat(480, 640, CV_8UC1, cv::Scalar(0));

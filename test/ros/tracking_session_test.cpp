@@ -303,7 +303,16 @@ TEST(TrackingSession, NoStreamOfMalformedMessagesDoesMoreThanBeRefused) {
   Spoiler spoiler;
   int tracked = 0, refused = 0;
   auto info = boost::make_shared<const sensor_msgs::CameraInfo>(good_info);
+  DrawOptions everything;
+  everything.templates = everything.information = everything.tree = everything.links =
+      everything.submaps = true;
+  const std::vector<std::string> matchers = {"auto", "active", "chow_liu", "jcbb"};
   for (int run = 0; run < runs; ++run) {
+    if (run % 500 == 0) {
+      TrackerOptions options = tinyOptions();
+      options.matcher = matchers[run / 500 % matchers.size()];
+      session.setOptions(options);
+    }
     sensor_msgs::Image image = imageOf(film.frames[run % film.frames.size()]);
     image.header.stamp += ros::Duration(4.0 * (run / int(film.frames.size())));
     if (spoiler.isOneIn(30)) {
@@ -332,7 +341,7 @@ TEST(TrackingSession, NoStreamOfMalformedMessagesDoesMoreThanBeRefused) {
     if (frame->state == TrackingState::kTracking && frame->nis_degrees > 8) ++tracked;
     expectFiniteMessages(*frame, session.calibration());
     if (run % 4 == 0) {
-      EXPECT_NO_THROW(drawDebugImage(*frame, {}, 1)) << "run " << run;
+      EXPECT_NO_THROW(drawDebugImage(*frame, everything, 1)) << "run " << run;
     }
     ASSERT_FALSE(testing::Test::HasFailure()) << "run " << run;
   }

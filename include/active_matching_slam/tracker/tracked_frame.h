@@ -79,8 +79,7 @@ struct TrackedFrame {
   int nis_degrees = 0;
 
   std::vector<TrackedFeature> features;
-  std::vector<std::vector<SearchMatch>> matches;  ///< all matches met, per candidate
-  std::vector<int> candidates;  ///< index into `features` of each entry of the MeasurementPrior
+  std::vector<std::vector<SearchMatch>> matches;  ///< all matches met, per entry of `prior`
   MatchResult matching;
   /// What the matcher was given, so that a frame can be matched again: the prediction, and one
   /// template for each of its entries. Empty when nothing was predicted.
