@@ -277,13 +277,16 @@ cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options, in
   if (options.searches) drawSearches(frame, &canvas);
   if (options.matches) drawMatches(frame, &canvas);
   if (options.submaps) drawSubmaps(frame, submap_level, &canvas);
-  if (options.information)
+  if (options.information) {
+    const auto bits_of = predictedInformationBits(frame);
     for (const TrackedFeature& feature : frame.features) {
-      if (feature.information_bits <= 0.0) continue;  // not predicted, or of no use to the matcher
-      char bits[16];
-      std::snprintf(bits, sizeof bits, "%.1f", feature.information_bits);
-      canvas.label(feature.predicted_px, bits, kWhite);
+      const auto bits = bits_of.find(feature.id);
+      if (bits == bits_of.end()) continue;
+      char text[16];
+      std::snprintf(text, sizeof text, "%.1f", bits->second);
+      canvas.label(feature.predicted_px, text, kWhite);
     }
+  }
   if (options.templates) drawTemplates(frame, &canvas.image());
   if (options.status) drawStatus(frame, &canvas.image());
   return canvas.image();

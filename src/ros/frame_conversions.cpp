@@ -21,7 +21,7 @@ void fillRowMajor(const Matrix& matrix, Array* array) {
       (*array)[row * matrix.cols() + col] = finiteOrZero(matrix(row, col));
 }
 
-ams_msgs::Feature toFeatureMsg(const TrackedFeature& feature, int submap) {
+ams_msgs::Feature toFeatureMsg(const TrackedFeature& feature, double information_bits, int submap) {
   ams_msgs::Feature message;
   message.id = feature.id;
   message.kind = feature.kind == FeatureKind::kPoint ? ams_msgs::Feature::POINT
@@ -39,7 +39,7 @@ ams_msgs::Feature toFeatureMsg(const TrackedFeature& feature, int submap) {
   if (feature.status != FeatureStatus::kNotVisible) {
     fillRowMajor(feature.predicted_px, &message.predicted_px);
     fillRowMajor(feature.innovation_covariance_px2, &message.innovation_covariance);
-    message.information_bits = finiteOrZero(feature.information_bits);
+    message.information_bits = finiteOrZero(information_bits);
   }
   if (feature.status == FeatureStatus::kMatched || feature.status == FeatureStatus::kRejected) {
     fillRowMajor(feature.matched_px, &message.matched_px);
@@ -77,10 +77,14 @@ ams_msgs::FeatureArray toFeatureArrayMsg(const TrackedFrame& frame, int submap_l
   ams_msgs::FeatureArray message;
   message.header = header;
   const std::vector<int> submaps = submapsAtLevel(frame, submap_level);
+  const auto bits_of = predictedInformationBits(frame);
   message.features.reserve(frame.features.size());
-  for (std::size_t i = 0; i < frame.features.size(); ++i)
-    if (isShowable(frame.features[i]))
-      message.features.push_back(toFeatureMsg(frame.features[i], submaps[i]));
+  for (std::size_t i = 0; i < frame.features.size(); ++i) {
+    if (!isShowable(frame.features[i])) continue;
+    const auto bits = bits_of.find(frame.features[i].id);
+    message.features.push_back(
+        toFeatureMsg(frame.features[i], bits == bits_of.end() ? 0.0 : bits->second, submaps[i]));
+  }
   return message;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "active_matching_slam/information/gaussian_information.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
@@ -48,6 +49,13 @@ std::string featureStatusName(FeatureStatus status) {
       return "matched";
   }
   return "";
+}
+
+std::unordered_map<FeatureId, double> predictedInformationBits(const TrackedFrame& frame) {
+  std::unordered_map<FeatureId, double> bits_of;
+  const Eigen::VectorXd bits = featureInformation(frame.prior.S).bits;
+  for (int i = 0; i < frame.prior.size(); ++i) bits_of[frame.prior.ids[i]] = bits[i];
+  return bits_of;
 }
 
 void Tracker::Implementation::describe(TrackedFrame* frame) const {

@@ -49,6 +49,22 @@ TEST(FeatureMessage, HoldsWhatTheFeatureIs) {
   EXPECT_EQ(21.0, feature.matched_px[1]);
 }
 
+TEST(FeatureMessage, TellsWhatAFeatureKnowsOfTheOthersInBits) {
+  TrackedFrame frame;
+  TrackedFeature unseen = matchedFeature(8);
+  unseen.status = FeatureStatus::kNotVisible;
+  frame.features = {matchedFeature(5), matchedFeature(6), matchedFeature(7), unseen};
+  frame.prior.ids = {5, 6, 7};
+  frame.prior.z.setZero(6);
+  frame.prior.S.setIdentity(6, 6);
+  frame.prior.S(0, 2) = frame.prior.S(2, 0) = std::sqrt(0.75);  // of the first two
+  const auto message = toFeatureArrayMsg(frame, 0, worldHeader());
+  EXPECT_NEAR(1.0, message.features[0].information_bits, 1e-9) << "-0.5 log2(1 - 0.75)";
+  EXPECT_NEAR(1.0, message.features[1].information_bits, 1e-9);
+  EXPECT_NEAR(0.0, message.features[2].information_bits, 1e-9);
+  EXPECT_EQ(0.0, message.features[3].information_bits);
+}
+
 TEST(FeatureMessage, StatusesAndKindsHaveTheNumbersOfTheMessage) {
   EXPECT_EQ(ams_msgs::Feature::NOT_VISIBLE, int(FeatureStatus::kNotVisible));
   EXPECT_EQ(ams_msgs::Feature::NOT_SEARCHED, int(FeatureStatus::kNotSearched));

@@ -288,6 +288,7 @@ TEST(DebugImage, DrawsTheMatchersTreeThoughAFeatureIsRetiredByNow) {
   frame.prior.ids = {1, 2};
   frame.prior.z.resize(4);
   frame.prior.z << 100, 100, 300, 100;
+  frame.prior.S.setIdentity(4, 4);
   frame.matching.tree_edges = {{0, 1}};
   DrawOptions tree;
   tree.predictions = tree.searches = tree.matches = tree.status = false;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "active_matching_slam/filter/ekf.h"
@@ -52,7 +53,6 @@ struct TrackedFeature {
   Eigen::Matrix2d innovation_covariance_px2;  ///< prior S_ii; valid unless kNotVisible
   Eigen::Vector2d matched_px;                 ///< kMatched (and kRejected: the best match met)
   double score = 0.0;                         ///< ZNCC of the match
-  double information_bits = 0.0;              ///< I(z_i; rest) in the prior
   int attempts = 0;                           ///< frames searched since it was started
   int successes = 0;                          ///< frames matched
   cv::Mat template_image;                     ///< 8-bit source patch at first sight
@@ -96,5 +96,9 @@ struct TrackedFrame {
   cv::Mat image;  ///< 8-bit grey, as tracked (shared, not to be written to)
   FrameTimings timings_ms;
 };
+
+/// I(z_i; all others) in the prediction (Chli 2009, eq. 4.31), by feature [bit]. Costs O(F^3), and
+/// few ask: so it is no part of the frame.
+std::unordered_map<FeatureId, double> predictedInformationBits(const TrackedFrame& frame);
 
 }  // namespace active_matching_slam
