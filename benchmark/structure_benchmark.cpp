@@ -54,7 +54,7 @@ void BM_StructureOfAFrame(benchmark::State& state) {
     state.SetIterationTime(1e-3 * frame->timings_ms.structure);
     structure_ms += frame->timings_ms.structure;
     total_ms += frame->timings_ms.total;
-    measured += static_cast<double>(frame->candidates.size());
+    measured += static_cast<double>(frame->prior.size());
     mapped += static_cast<double>(frame->features.size());
     ++frames;
   }

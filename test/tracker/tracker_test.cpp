@@ -303,8 +303,8 @@ TEST(Tracker, MeasuresAsManyFeaturesAsItIsTold) {
     tracker.setOptions(options);
     for (const auto& frame : trackFrames(film, &tracker, next, next + 10)) {
       EXPECT_EQ(frame->state, TrackingState::kTracking);
-      EXPECT_LE(static_cast<int>(frame->candidates.size()), wanted);
-      EXPECT_GE(static_cast<int>(frame->candidates.size()), std::min(wanted, 15));
+      EXPECT_LE(frame->prior.size(), wanted);
+      EXPECT_GE(frame->prior.size(), std::min(wanted, 15));
       EXPECT_EQ(frame->resets, 0);
     }
     next += 10;
@@ -440,7 +440,7 @@ TEST(Tracker, AccountsForEveryCandidate) {
       return std::count_if(frame->features.begin(), frame->features.end(),
                            [&](const TrackedFeature& f) { return f.status == status; });
     };
-    EXPECT_EQ(frame->candidates.size(), frame->matches.size());
+    EXPECT_EQ(frame->prior.ids.size(), frame->matches.size());
     for (const TrackedFeature& feature : frame->features) {
       EXPECT_LE(feature.successes, feature.attempts);
       EXPECT_FALSE(feature.known);
