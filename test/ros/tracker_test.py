@@ -218,20 +218,36 @@ class TrackerTest(harness.TrackerTestCase):
         self.assertEqual(TrackingState.TRACKING, states[-1].state)
         self.assertTrue(all(harness.all_finite(m) for m in inbox.messages))
 
+    def cover_lens(self, first):
+        """The first state after image `first` that is not TRACKING any more, and its index."""
+        for index in range(first, len(self.images) - 1):
+            state = self.feeder.feed(self.image(index, self.covered_lens(index)))
+            if state.state != TrackingState.TRACKING:
+                return state, index
+        return self.fail('a covered lens is still tracked with')
+
+    def covered_lens(self, index):
+        """A new picture each time: the hand over the lens moves."""
+        noise = np.random.RandomState(index)
+        return noise.randint(0, 40, (self.images[0].height, self.images[0].width))
+
+    def test_lost_with_no_depths_known_begins_anew_and_says_why(self):
+        before = self.run_images(0, 5)[-1]
+        lost, index = self.cover_lens(5)
+        self.assertEqual(TrackingState.LOST, lost.state)
+        anew = self.feeder.feed(self.image(index + 1, self.covered_lens(index + 1)))
+        self.assertEqual(before.resets + 1, anew.resets)
+        self.assertNotEqual(TrackingState.LOST, anew.state)
+        self.assertIn('too few features of known depth', anew.reason)
+
     def test_a_lost_camera_claims_no_pose_and_says_why(self):
-        self.run_images(0, 10)
+        self.run_images(0, 40)
         transforms = self.inbox('/tf', TFMessage)
         inbox = self.inbox('pose', PoseWithCovarianceStamped)
-        noise = np.random.RandomState(1)
-        shape = (self.images[0].height, self.images[0].width)
-        for index in range(10, 60):
-            # A new picture each time: the hand over the lens moves.
-            state = self.feeder.feed(self.image(index, noise.randint(0, 40, shape)))
-            if state.state == TrackingState.LOST:
-                break
+        state, index = self.cover_lens(40)
         self.assertEqual(TrackingState.LOST, state.state)
         self.assertNotEqual('', state.reason)
-        blind = self.feeder.feed(self.image(index + 1, noise.randint(0, 40, shape)))
+        blind = self.feeder.feed(self.image(index + 1, self.covered_lens(index + 1)))
         self.assertEqual(TrackingState.LOST, blind.state)
         self.assertIsNone(inbox.wait_for_stamp(blind.header.stamp, 1.0))
         self.assertIsNone(transforms.wait_for_stamp(blind.header.stamp, 0.0))
