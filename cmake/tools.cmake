@@ -1,6 +1,7 @@
 # What the tools share. Of the ROS layer they need how messages are read and made, and frames drawn.
 file(GLOB tool_common_sources CONFIGURE_DEPENDS src/tools/common/*.cpp)
-add_library(ams_tools STATIC ${tool_common_sources} src/ros/debug_image.cpp src/ros/submap_view.cpp
+add_library(ams_tools STATIC ${tool_common_sources} src/ros/debug_canvas.cpp src/ros/debug_image.cpp
+  src/ros/link_view.cpp src/ros/submap_view.cpp
   src/ros/image_conversions.cpp src/ros/pose_conversions.cpp src/ros/frame_conversions.cpp)
 add_dependencies(ams_tools ${PROJECT_NAME}_generate_messages_cpp)
 target_include_directories(ams_tools SYSTEM PUBLIC ${catkin_INCLUDE_DIRS})

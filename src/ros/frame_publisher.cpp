@@ -64,7 +64,7 @@ void FramePublisher::restart() {
 }
 
 bool FramePublisher::wantsTrace() const {
-  return debug_image_.getNumSubscribers() > 0 && options_.draw.searches;
+  return debug_image_.getNumSubscribers() > 0 && (options_.draw.searches || options_.draw.matches);
 }
 
 bool FramePublisher::wantsStructure() const {
@@ -122,8 +122,8 @@ void FramePublisher::publishMarkers(const TrackedFrame& frame, const FrameContex
                                     const TrajectoryLog& trajectory) {
   const std_msgs::Header header = worldHeader(context.stamp);
   feature_markers_.publish(header, [&] { return featureMarkers(frame, header); });
-  information_markers_.publish(
-      header, [&] { return informationMarkers(frame, options_.draw.minimum_link_bits, header); });
+  information_markers_.publish(header,
+                               [&] { return informationMarkers(frame, options_.draw, header); });
   submap_markers_.publish(header,
                           [&] { return submapMarkers(frame, options_.submap_level, header); });
   camera_markers_.publish(header, [&] {

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "active_matching_slam/ros/frame_conversions.h"
+#include "active_matching_slam/ros/link_view.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 
 namespace active_matching_slam {
@@ -190,15 +191,14 @@ MarkerArray featureMarkers(const TrackedFrame& frame, const std_msgs::Header& he
   return markers;
 }
 
-MarkerArray informationMarkers(const TrackedFrame& frame, double minimum_bits,
+MarkerArray informationMarkers(const TrackedFrame& frame, const DrawOptions& options,
                                const std_msgs::Header& header) {
   MarkerArray markers;
   if (!frame.graph) return markers;
   const double size = sceneSize(frame);
   const auto index = indexById(frame);
-  double strongest = 1e-9;
-  for (const InformationLink& link : frame.graph->links)
-    strongest = std::max(strongest, link.information_bits);
+  const std::vector<InformationLink> links = linksToShow(frame.graph->links, options);
+  const double strongest = links.empty() ? 1.0 : std::max(1e-9, links.back().information_bits);
 
   // A list of lines has one width: links fall into classes of strength.
   constexpr int kClasses = 4;
@@ -206,7 +206,7 @@ MarkerArray informationMarkers(const TrackedFrame& frame, double minimum_bits,
   for (int c = 0; c < kClasses; ++c)
     classes.push_back(makeLines(header, "links", c, (0.0006 + 0.0008 * c) * size));
   Marker tree = makeLines(header, "tree", 0, 0.005 * size);
-  for (const InformationLink& link : frame.graph->links) {
+  for (const InformationLink& link : links) {
     const auto first = index.find(link.first), second = index.find(link.second);
     if (first == index.end() || second == index.end()) continue;
     const Eigen::Vector3d& from = frame.features[first->second].position_world;
@@ -214,9 +214,11 @@ MarkerArray informationMarkers(const TrackedFrame& frame, double minimum_bits,
     const double share = std::clamp(link.information_bits / strongest, 0.0, 1.0);
     if (link.in_tree) {
       addLine(&tree, from, to, color(1.0, 0.8, 0.2));
-    } else if (link.information_bits >= minimum_bits) {
+    } else {
       const int c = std::min(kClasses - 1, static_cast<int>(share * kClasses));
-      addLine(&classes[c], from, to, color(share, 0.35, 1.0 - share, 0.15 + 0.5 * share));
+      // From dim blue to white: no submap has such a colour.
+      addLine(&classes[c], from, to,
+              color(0.3 + 0.7 * share, 0.45 + 0.55 * share, 0.8 + 0.2 * share, 0.15 + 0.4 * share));
     }
   }
   for (Marker& marker : classes) keepIfAny(&markers, std::move(marker));

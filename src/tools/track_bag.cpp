@@ -80,10 +80,13 @@ po::options_description describeOptions(Settings* s) {
   return options;
 }
 
+bool isAnnotated(const Settings& settings) { return settings.annotate || !settings.draw.empty(); }
+
 TrackerOptions trackerOptionsOf(const Settings& settings) {
   TrackerOptions options;
   if (!settings.config.empty()) options = readTrackerOptionsYaml(settings.config);
   options.structure = true;  // the report shows it, whatever a live node needs
+  options.matching.keep_trace = isAnnotated(settings);
   if (!settings.known_target.empty())
     options.known_points = readKnownPointsYaml(settings.known_target);
   if (!settings.matcher.empty()) options.matcher = settings.matcher;
@@ -187,7 +190,7 @@ void run(const Settings& settings) {
 
   Tracker tracker(camera, options);
   std::unique_ptr<AnnotatedVideo> video;
-  if (settings.annotate || !settings.draw.empty())
+  if (isAnnotated(settings))
     video = std::make_unique<AnnotatedVideo>(settings.output + "/annotated.avi",
                                              drawingOf(settings.draw));
   bool has_map = false;

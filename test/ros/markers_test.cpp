@@ -5,27 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "active_matching_slam/ros/debug_image.h"
 #include "active_matching_slam/ros/frame_conversions.h"
+#include "active_matching_slam/ros/link_view.h"
 #include "active_matching_slam/ros/pose_conversions.h"
+#include "ros/point_feature.h"
 
 namespace active_matching_slam {
 namespace {
 
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
-
-TrackedFeature pointFeature(FeatureId id, const Eigen::Vector3d& position) {
-  TrackedFeature feature;
-  feature.id = id;
-  feature.kind = FeatureKind::kPoint;
-  feature.position_world = position;
-  feature.covariance_world = Eigen::Vector3d(1e-4, 4e-4, 9e-4).asDiagonal();
-  feature.status = FeatureStatus::kMatched;
-  feature.predicted_px = feature.matched_px = Eigen::Vector2d(50, 40);
-  feature.innovation_covariance_px2 = Eigen::Matrix2d::Identity();
-  return feature;
-}
 
 std_msgs::Header worldHeader() {
   std_msgs::Header header;
@@ -57,16 +46,6 @@ TEST(Ellipsoid, AxesAreThreeTimesTheRootsOfTheVariances) {
 TEST(Ellipsoid, RoundingBelowZeroDoesNotMakeItNaN) {
   const Ellipsoid ellipsoid = threeSigmaEllipsoid(Eigen::Vector3d(-1e-18, 0.0, 1.0).asDiagonal());
   EXPECT_TRUE(ellipsoid.semi_axes_m.allFinite());
-}
-
-TEST(Ellipse, AxesAreThreeTimesTheRootsOfTheVariances) {
-  const double angle = 0.4;
-  const Eigen::Matrix2d R = Eigen::Rotation2Dd(angle).toRotationMatrix();
-  const Eigen::Matrix2d covariance = R * Eigen::Vector2d(16.0, 4.0).asDiagonal() * R.transpose();
-  const EllipseAxes axes = threeSigmaEllipse(covariance);
-  EXPECT_NEAR(12.0, axes.major_px, 1e-9);
-  EXPECT_NEAR(6.0, axes.minor_px, 1e-9);
-  EXPECT_NEAR(0.0, std::sin(axes.angle_deg * M_PI / 180.0 - angle), 1e-9);
 }
 
 TEST(Ray, CoversThreeSigmaOfInverseDepthAndEndsAtTheLimitWhenInfinityIsInside) {
@@ -161,13 +140,33 @@ TEST(InformationMarkers, TreeLinksStandOutAndWeakLinksAreLeftOut) {
   graph->ids = {1, 2, 3};
   graph->links = {{1, 2, 4.0, 5, true}, {1, 3, 2.0, 5, false}, {2, 3, 0.1, 5, false}};
   frame.graph = graph;
-  const MarkerArray markers = informationMarkers(frame, 0.5, worldHeader());
+  const MarkerArray markers = informationMarkers(frame, DrawOptions(), worldHeader());
   ASSERT_TRUE(find(markers, "tree", 0));
   EXPECT_EQ(2u, find(markers, "tree", 0)->points.size());
   std::size_t ends = 0;
   for (const Marker& marker : markers.markers)
     if (marker.ns == "links") ends += marker.points.size();
   EXPECT_EQ(2u, ends);
+}
+
+TEST(LinksToShow, AreTheStrongestOfEachFeatureAndTheTree) {
+  const std::vector<InformationLink> links = {{1, 2, 4.0, 1, true},  {1, 3, 3.0, 1, false},
+                                              {1, 4, 2.0, 1, true},  {2, 3, 1.5, 1, false},
+                                              {2, 4, 1.0, 1, false}, {3, 4, 0.7, 1, false}};
+  DrawOptions options;
+  const auto bitsShown = [&](int per_feature, double minimum_bits) {
+    options.links_per_feature = per_feature;
+    options.minimum_link_bits = minimum_bits;
+    std::vector<double> bits;
+    for (const InformationLink& link : linksToShow(links, options))
+      bits.push_back(link.information_bits);
+    return bits;
+  };
+  using Bits = std::vector<double>;
+  EXPECT_EQ((Bits{2.0, 4.0}), bitsShown(0, 0.5));
+  EXPECT_EQ((Bits{2.0, 3.0, 4.0}), bitsShown(1, 0.5));
+  EXPECT_EQ((Bits{1.0, 1.5, 2.0, 3.0, 4.0}), bitsShown(2, 0.5));
+  EXPECT_EQ((Bits{2.0, 3.0, 4.0}), bitsShown(3, 2.5)) << "the tree is shown whole";
 }
 
 TEST(SubmapMarkers, FeaturesOfOneSubmapShareAColourAndAnOutline) {
@@ -219,92 +218,6 @@ TEST(MarkerHistory, DeletesWhatIsNoMore) {
   markers = featureMarkers(frame, worldHeader());
   history.complete(worldHeader(), &markers);
   EXPECT_EQ(Marker::DELETEALL, markers.markers.front().action);
-}
-
-TEST(DebugImage, ShowsMatchesInColourAndEnlargesSmallImages) {
-  TrackedFrame frame;
-  EXPECT_TRUE(drawDebugImage(frame, DrawOptions(), 0).empty());
-  frame.image = cv::Mat(240, 320, CV_8UC1, cv::Scalar(128));
-  frame.features = {pointFeature(1, {0, 0, 1})};
-  const cv::Mat image = drawDebugImage(frame, DrawOptions(), 0);
-  ASSERT_EQ(CV_8UC3, image.type());
-  EXPECT_EQ(640, image.cols);
-  const cv::Vec3b at_match = image.at<cv::Vec3b>(81, 101);
-  EXPECT_GT(at_match[1], at_match[2] + 50) << "green at the match";
-  EXPECT_EQ(0.0, cv::norm(frame.image, cv::Mat(240, 320, CV_8UC1, cv::Scalar(128))))
-      << "the tracked image is left alone";
-}
-
-TEST(DebugImage, ShowsLinksByBitsAndSubmapsInTheirColoursWhenAsked) {
-  TrackedFrame frame;
-  frame.image = cv::Mat(480, 640, CV_8UC1, cv::Scalar(0));
-  for (int i = 0; i < 3; ++i) {
-    frame.features.push_back(pointFeature(i, {0, 0, 1}));
-    frame.features[i].predicted_px = {100.0 + 200.0 * i, 100.0 + 300.0 * (i % 2)};
-  }
-  auto graph = std::make_shared<MutualInformationGraph>();
-  graph->ids = {0, 1, 2};
-  graph->links = {{0, 1, 4.0, 5, true}, {0, 2, 1.0, 5, false}, {1, 2, 0.1, 5, true}};
-  frame.graph = graph;
-  auto hierarchy = std::make_shared<SubmapHierarchy>();
-  hierarchy->ids = graph->ids;
-  hierarchy->levels.resize(2);
-  hierarchy->levels[0].submap_of_feature = {0, 1, 2};
-  hierarchy->levels[1].submap_of_feature = {3, 3, 5};
-  frame.submaps = hierarchy;
-  const auto middle = [&](const cv::Mat& image, int i, int j) {
-    const Eigen::Vector2d at =
-        0.5 * (frame.features[i].predicted_px + frame.features[j].predicted_px);
-    return image.at<cv::Vec3b>(static_cast<int>(at.y()), static_cast<int>(at.x()));
-  };
-  DrawOptions plain;
-  plain.predictions = plain.searches = plain.matches = plain.status = false;
-  EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(drawDebugImage(frame, plain, 1), 0, 1));
-
-  DrawOptions links = plain;
-  links.links = true;
-  cv::Mat image = drawDebugImage(frame, links, 1);
-  EXPECT_GT(middle(image, 0, 1)[2], 200) << "yellow: the strongest";
-  EXPECT_GT(cv::norm(middle(image, 0, 2)), 0.0);
-  EXPECT_LT(middle(image, 0, 2)[2], 100) << "darker: weaker";
-  EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(image, 1, 2)) << "too weak";
-
-  DrawOptions submaps = plain;
-  submaps.submaps = true;
-  image = drawDebugImage(frame, submaps, 1);
-  const std_msgs::ColorRGBA third = submapColor(3);
-  const cv::Vec3b inside = middle(image, 0, 1), across = middle(image, 1, 2);
-  EXPECT_NEAR(255.0 * third.r, inside[2], 3.0);
-  EXPECT_NEAR(255.0 * third.b, inside[0], 3.0);
-  EXPECT_GT(across[0], 0);
-  EXPECT_EQ(across[0], across[2]) << "grey: joins two submaps";
-  EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(image, 0, 2)) << "not of the tree";
-}
-
-TEST(DebugImage, DrawsTheMatchersTreeThoughAFeatureIsRetiredByNow) {
-  TrackedFrame frame;
-  frame.image = cv::Mat(480, 640, CV_8UC1, cv::Scalar(0));
-  frame.features = {pointFeature(2, {0, 0, 1})};
-  frame.prior.ids = {1, 2};
-  frame.prior.z.resize(4);
-  frame.prior.z << 100, 100, 300, 100;
-  frame.prior.S.setIdentity(4, 4);
-  frame.matching.tree_edges = {{0, 1}};
-  DrawOptions tree;
-  tree.predictions = tree.searches = tree.matches = tree.status = false;
-  tree.tree = tree.information = true;
-  EXPECT_NE(cv::Vec3b(0, 0, 0), drawDebugImage(frame, tree, 0).at<cv::Vec3b>(100, 200));
-}
-
-TEST(DebugImage, SurvivesWhatIsNotFinite) {
-  TrackedFrame frame;
-  frame.image = cv::Mat(480, 640, CV_8UC1, cv::Scalar(0));
-  frame.features = {pointFeature(1, {0, 0, 1})};
-  frame.features[0].predicted_px.setConstant(std::nan(""));
-  frame.features[0].innovation_covariance_px2.setConstant(INFINITY);
-  DrawOptions all;
-  all.templates = all.information = all.tree = all.links = all.submaps = true;
-  EXPECT_NO_THROW(drawDebugImage(frame, all, 0));
 }
 
 }  // namespace

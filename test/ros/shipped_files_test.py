@@ -44,8 +44,30 @@ class ShippedFilesTest(unittest.TestCase):
                         node, config.machines.get('', next(iter(config.machines.values())))),
                                     node.type)
             if 'rviz' in programs:
-                view = programs['rviz'].args.split('-d ')[1]
+                view = programs['rviz'].args.split()[1]
                 self.assertTrue(os.path.isfile(view), view)
+
+    def test_rviz_shows_a_frame_that_is_sent_and_the_topics_of_its_tracker(self):
+        path = self.files('launch/tracker.launch')[0]
+        for given, sent in (({}, 'map'), ({'map_frame': 'floor'}, 'floor'),
+                            ({'tf_mode': 'none', 'world_frame': 'room'}, 'room')):
+            config = self.load(path, rviz='true', **given)
+            view = [node for node in config.nodes if node.type == 'rviz'][0]
+            self.assertEqual(['-f', sent], view.args.split()[2:], given)
+            if 'tf_mode' not in given:
+                self.assertEqual(sent, config.params['/tracker/map_frame'].value)
+        self.assertEqual('', self.load(path).params['/tracker/map_frame'].value)
+        named = self.load(path, rviz='true', name='left')
+        view = [node for node in named.nodes if node.type == 'rviz'][0]
+        remapped = dict(view.remap_args)
+        for topic in self.topics_shown('rviz/tracker.rviz'):
+            self.assertEqual(topic.replace('/tracker/', '/left/'), remapped[topic])
+
+    def topics_shown(self, path):
+        with open(os.path.join(PACKAGE, path)) as file:
+            displays = yaml.safe_load(file)['Visualization Manager']['Displays']
+        return [value for display in displays for key, value in display.items()
+                if key in ('Image Topic', 'Marker Topic', 'Topic')]
 
     def test_launch_files_default_to_the_topics_of_the_tools(self):
         config = self.load(self.files('launch/tracker.launch')[0])
@@ -77,11 +99,7 @@ class ShippedFilesTest(unittest.TestCase):
                            what='topics of the tracker')
         topics = dict(rospy.get_published_topics())
         for path in self.files('rviz/*.rviz'):
-            with open(path) as file:
-                view = yaml.safe_load(file)
-            displays = view['Visualization Manager']['Displays']
-            shown = [value for display in displays for key, value in display.items()
-                     if key in ('Image Topic', 'Marker Topic', 'Topic')]
+            shown = self.topics_shown(path)
             self.assertGreater(len(shown), 4, path)
             for topic in shown:
                 self.assertIn(topic, topics, path)

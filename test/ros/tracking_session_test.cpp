@@ -165,7 +165,7 @@ void expectFiniteMessages(const TrackedFrame& frame, const CameraCalibration& ca
   EXPECT_TRUE(isFiniteMessage(toGraphMsg(frame, header)));
   EXPECT_TRUE(isFiniteMessage(toSubmapsMsg(frame, header)));
   EXPECT_TRUE(isFiniteMessage(featureMarkers(frame, header)));
-  EXPECT_TRUE(isFiniteMessage(informationMarkers(frame, 0.5, header)));
+  EXPECT_TRUE(isFiniteMessage(informationMarkers(frame, DrawOptions(), header)));
   EXPECT_TRUE(isFiniteMessage(submapMarkers(frame, 1, header)));
   const TrajectoryPoint here{frame.camera.position_world,
                              frame.camera_covariance.topLeftCorner<3, 3>()};

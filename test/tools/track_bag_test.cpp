@@ -13,6 +13,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 #include <sstream>
 
 #include "active_matching_slam/evaluation/trajectory.h"
@@ -150,10 +151,28 @@ TEST_F(TrackBag, LeavesTheMapAndABagOfWhatANodePublishes) {
   std::size_t i = 0;
   for (const rosbag::MessageInstance& instance : poses) {
     const auto& transform = instance.instantiate<tf2_msgs::TFMessage>()->transforms.front();
-    EXPECT_NEAR(transform.transform.translation.x,
-                trajectory[i++].T_world_camera.translation().x(), 1e-6);
+    EXPECT_NEAR(transform.transform.translation.x, trajectory[i++].T_world_camera.translation().x(),
+                1e-6);
   }
   EXPECT_FALSE(readMapFile(path("kept/final.map")).map.empty());
+}
+
+TEST_F(TrackBag, TheAnnotatedVideoShowsTheSearchesInTheirOrder) {
+  ASSERT_EQ(track("slide.bag", "--matcher active --annotate", "annotated").status, 0);
+  cv::VideoCapture video(path("annotated/annotated.avi"));
+  cv::Mat picture;
+  int frames = 0, cyan = 0, magenta = 0;
+  for (cv::Mat next; video.read(next); ++frames) picture = next.clone();
+  EXPECT_EQ(frames, kFrames);
+  ASSERT_GT(picture.rows, 600) << "four times as large, and a legend";
+  for (int y = 0; y < 600; ++y)
+    for (int x = 0; x < picture.cols; ++x) {
+      const cv::Vec3b bgr = picture.at<cv::Vec3b>(y, x);
+      cyan += bgr[0] > bgr[2] + 80 && bgr[1] > bgr[2] + 80;
+      magenta += bgr[0] > bgr[1] + 80 && bgr[2] > bgr[1] + 80;
+    }
+  EXPECT_GT(cyan, 20);
+  EXPECT_GT(magenta, 20);
 }
 
 TEST_F(TrackBag, TheSameRunGivesTheSameResultBitForBit) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "active_matching_slam/camera/camera_calibration.h"
+#include "active_matching_slam/ros/node_options.h"
 #include "active_matching_slam/tracker/tracked_frame.h"
 
 namespace active_matching_slam {
@@ -38,8 +39,9 @@ struct TrajectoryPoint {
 /// Points, 3-sigma ellipsoids; inverse-depth features as the 3-sigma interval of their ray.
 visualization_msgs::MarkerArray featureMarkers(const TrackedFrame& frame,
                                                const std_msgs::Header& header);
-/// Links of at least `minimum_bits`, width and colour by bits; the tree in gold on top.
-visualization_msgs::MarkerArray informationMarkers(const TrackedFrame& frame, double minimum_bits,
+/// linksToShow(), width and colour by bits; the tree in gold on top.
+visualization_msgs::MarkerArray informationMarkers(const TrackedFrame& frame,
+                                                   const DrawOptions& options,
                                                    const std_msgs::Header& header);
 /// Features and tree links in the colour of their submap at `level`, with hulls and labels.
 visualization_msgs::MarkerArray submapMarkers(const TrackedFrame& frame, int level,

@@ -17,8 +17,10 @@ struct DrawOptions {
   bool links = false;        ///< links of mutual information
   bool submaps = false;      ///< features and tree in the colours of their submaps
   bool status = true;        ///< one line of text
+  bool legend = true;        ///< what the marks mean
   double frustum_m = 0.15;
   double minimum_link_bits = 0.5;
+  int links_per_feature = 3;  ///< see linksToShow()
 };
 
 /// The tracker's settings in a node, which must keep up with the camera: the core's, and a bound on
@@ -95,7 +97,7 @@ void visitNodeOptions(Options& o, Visitor&& visit) {
         o.draw.predictions);
   visit(F{"draw/searches", "searched ellipses in ~debug_image, coloured first to last", true},
         o.draw.searches);
-  visit(F{"draw/matches", "matches, accepted and rejected, and failed searches", true},
+  visit(F{"draw/matches", "matches, accepted and not, and searches that found nothing", true},
         o.draw.matches);
   visit(F{"draw/templates", "the features' patches at the lower border", true}, o.draw.templates);
   visit(F{"draw/information", "mutual information beside each candidate [bit]", true},
@@ -107,12 +109,17 @@ void visitNodeOptions(Options& o, Visitor&& visit) {
   visit(
       F{"draw/submaps", "features and tree in the colours of their submaps in ~debug_image", true},
       o.draw.submaps);
-  visit(F{"draw/status", "a line of text in ~debug_image", true}, o.draw.status);
+  visit(F{"draw/status", "a line of text below ~debug_image", true}, o.draw.status);
+  visit(F{"draw/legend", "what the marks mean, below ~debug_image", true}, o.draw.legend);
   visit(F{"draw/frustum_m", "length of the camera's frustum in ~markers/camera [m]", true},
         o.draw.frustum_m, 1e-3, 1e3);
   visit(F{"draw/minimum_link_bits",
           "weaker links are left out of ~markers/mutual_information and ~debug_image [bit]", true},
         o.draw.minimum_link_bits, 0.0, 100.0);
+  visit(
+      F{"draw/links_per_feature",
+        "so many of each feature's links are shown there, the strongest; the tree's besides", true},
+      o.draw.links_per_feature, 0, 10000);
 }
 
 /// Throws std::invalid_argument naming the setting: ranges, tf_mode, frames that are equal or
