@@ -206,6 +206,7 @@ sensor_msgs::PointCloud2 toPointCloudMsg(const TrackedFrame& frame, int submap_l
                                 PointField::FLOAT32);
   modifier.resize(shown.size());
   cloud.is_dense = true;
+  if (shown.empty()) return cloud;  // iterators would look at the first of no bytes
   sensor_msgs::PointCloud2Iterator<float> xyz(cloud, "x"), sigma(cloud, "sigma");
   sensor_msgs::PointCloud2Iterator<std::int32_t> id(cloud, "id"), submap(cloud, "submap");
   sensor_msgs::PointCloud2Iterator<std::uint8_t> bgr(cloud, "rgb");

@@ -100,6 +100,14 @@ TEST(FeatureMessage, NothingThatIsNotFiniteIsPublished) {
   EXPECT_EQ(0.0, toStatisticsMsg(frame, 0, worldHeader()).nis);
 }
 
+TEST(PointCloud, OfAnEmptyMapHasItsFieldsAndNoPoints) {
+  const auto cloud = toPointCloudMsg(TrackedFrame(), 0, worldHeader());
+  EXPECT_EQ(0u, cloud.width);
+  EXPECT_EQ(7u, cloud.fields.size());
+  EXPECT_TRUE(cloud.data.empty());
+  EXPECT_EQ("world", cloud.header.frame_id);
+}
+
 TEST(PointCloud, HoldsPositionSigmaIdAndSubmap) {
   TrackedFrame frame;
   frame.features = {matchedFeature(5), matchedFeature(9)};
