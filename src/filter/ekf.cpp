@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "active_matching_slam/filter/blas_threads.h"
 #include "active_matching_slam/filter/rotation.h"
 #include "active_matching_slam/filter/state_error.h"
+#include "active_matching_slam/information/blas_threads.h"
 
 namespace active_matching_slam {
 

@@ -1,5 +1,6 @@
 #include "active_matching_slam/image/image_motion.h"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
@@ -7,10 +8,14 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kWidths[] = {40, 80};  ///< of the copies, coarse to fine [px]
+constexpr int kCoarseWidth = 40, kFineWidth = 80;  ///< of the copies [px]
 constexpr double kSmoothing = 2.0;   ///< standard deviation [px of the copies]
 constexpr double kLeastCorrelation = 0.75;
 constexpr double kSigma = 0.75;  ///< of the result [px of the finest copies]
+/// Of what the correlation lacks to 1: of two alignments at different places one must leave less
+/// than this share of the other's.
+constexpr double kClearlyBetter = 0.5;
+constexpr double kSamePlaceSigmas = 4.0;
 constexpr int kMostSteps = 30;
 constexpr double kSmallGain = 1e-3;  ///< of the correlation: a step that gains less is the last
 
@@ -46,6 +51,17 @@ double align(const cv::Mat& previous, const cv::Mat& image, double scale, ImageM
   return correlation;
 }
 
+double scaleOf(int width, const cv::Mat& image) { return static_cast<double>(width) / image.cols; }
+
+/// Largest distance [px] between where two motions take a corner of the image.
+double farthestApart(const ImageMotion& a, const ImageMotion& b, const cv::Size& size) {
+  double farthest = 0.0;
+  for (const double u : {0.0, static_cast<double>(size.width)})
+    for (const double v : {0.0, static_cast<double>(size.height)})
+      farthest = std::max(farthest, (a({u, v}) - b({u, v})).norm());
+  return farthest;
+}
+
 }  // namespace
 
 std::optional<ImageMotion> estimateImageMotion(const cv::Mat& previous, const cv::Mat& image,
@@ -53,14 +69,22 @@ std::optional<ImageMotion> estimateImageMotion(const cv::Mat& previous, const cv
   if (image.empty() || image.size() != previous.size() || image.type() != CV_8UC1 ||
       previous.type() != CV_8UC1)
     return std::nullopt;
-  ImageMotion motion = guess;
-  double correlation = 0.0, scale = 1.0;
-  for (const int width : kWidths) {
-    scale = static_cast<double>(width) / image.cols;
-    correlation = align(previous, image, scale, &motion);
-  }
-  if (correlation < kLeastCorrelation) return std::nullopt;
-  motion.sigma_px = kSigma / scale;
+  // Coarse to fine reaches far; from the guess the fine copies alone find what is near. Where the
+  // scene repeats itself these are two places, and one is right only if it fits clearly better.
+  ImageMotion far = guess, near = guess;
+  const double coarse = scaleOf(kCoarseWidth, image), fine = scaleOf(kFineWidth, image);
+  double of_far = 0.0;
+  if (align(previous, image, coarse, &far) > 0.0) of_far = align(previous, image, fine, &far);
+  const double of_near = align(previous, image, fine, &near);
+  const bool is_near = of_near > of_far;
+  if (std::max(of_near, of_far) < kLeastCorrelation) return std::nullopt;
+  const double sigma_px = kSigma / fine;
+  const double misfit = 1.0 - std::max(of_near, of_far), other = 1.0 - std::min(of_near, of_far);
+  if (misfit > kClearlyBetter * other &&
+      farthestApart(near, far, image.size()) > kSamePlaceSigmas * sigma_px)
+    return std::nullopt;
+  ImageMotion motion = is_near ? near : far;
+  motion.sigma_px = sigma_px;
   return motion;
 }
 

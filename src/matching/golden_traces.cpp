@@ -11,6 +11,7 @@ MatchOptions traceOptions(UpdateRule rule) {
   options.update_rule = rule;
   options.keep_trace = true;
   options.recount = false;
+  options.hearing_weight = 0.0;
   return options;
 }
 

@@ -23,6 +23,9 @@ void checkMatchOptions(const MatchOptions& o) {
   require(isProbability(o.default_rates.false_positive), "default_rates.false_positive",
           o.default_rates.false_positive, "(0, 1)");
   require(o.prune_weight >= 0.0 && o.prune_weight < 1.0, "prune_weight", o.prune_weight, "[0, 1)");
+  require(o.hearing_weight >= 0.0 && o.hearing_weight <= 1.0, "hearing_weight", o.hearing_weight,
+          "[0, 1]");
+  require(o.runners_up >= 0, "runners_up", o.runners_up, "[0, inf)");
   require(o.max_gaussians >= 0, "max_gaussians", o.max_gaussians, "[0, inf)");
   require(o.merge_sigmas >= 0.0, "merge_sigmas", o.merge_sigmas, "[0, inf)");
   require(o.merge_share >= 0.0 && o.merge_share <= 1.0, "merge_share", o.merge_share, "[0, 1]");

@@ -177,6 +177,22 @@ Measurement MeasurementChoice::bestOfDrawn(int count, std::mt19937_64& random, d
   return best;
 }
 
+Measurement MeasurementChoice::bestOf(int hypothesis) {
+  const auto& candidates = mixture_.hypotheses()[slot(hypothesis)].candidates;
+  Measurement best;
+  double most = 0.0;
+  for (int c = 0; c < static_cast<int>(candidates.size()); ++c) {
+    const double score = candidates[slot(c)].bits / candidates[slot(c)].area;
+    if (!(score > most) || !isCandidate(hypothesis, c)) continue;
+    most = score;
+    best = {hypothesis, c, {}};
+  }
+  if (!best.exists()) return best;
+  beginStep();
+  best.expected = evaluate(hypothesis, best.candidate);
+  return best;
+}
+
 Measurement MeasurementChoice::firstOf(int hypothesis) {
   const auto& candidates = mixture_.hypotheses()[slot(hypothesis)].candidates;
   for (int c = 0; c < static_cast<int>(candidates.size()); ++c)

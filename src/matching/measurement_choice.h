@@ -39,6 +39,8 @@ class MeasurementChoice {
   /// The best of `count` candidates drawn at random, evenly spread over the Gaussians; `most_bits`:
   /// the largest expected information among them.
   Measurement bestOfDrawn(int count, std::mt19937_64& random, double& most_bits);
+  /// The candidate of one hypothesis with the most continuous information per pixel.
+  Measurement bestOf(int hypothesis);
   /// The lowest candidate of one hypothesis, without any evaluation.
   Measurement firstOf(int hypothesis);
 

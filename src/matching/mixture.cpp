@@ -48,6 +48,15 @@ int Mixture::heaviest() const {
   return best;
 }
 
+int Mixture::unheard() const {
+  constexpr double kLost = 0.2;
+  for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
+    const Hypothesis& h = hypotheses_[slot(k)];
+    if (h.weight < kLost * h.most_weight && awaitsHearing(h)) return k;
+  }
+  return -1;
+}
+
 double Mixture::computeMass(const Hypothesis& of, const Hypothesis& in,
                             const Hypothesis::Candidate& candidate) const {
   const int f = candidate.feature;
@@ -261,6 +270,7 @@ SearchOutcome Mixture::searchOnly(int g, int c) {
   searched_.push_back({ellipse, h.lineage[slot(f)]});
   h.lineage[slot(f)] = static_cast<int>(searched_.size()) - 1;
   h.candidates[slot(c)].open = false;
+  h.was_searched = true;
   return outcome;
 }
 
@@ -283,6 +293,7 @@ void Mixture::fuse(int g, int c, int match) {
   fused.parent = h.parent;
   fused.log_weight = h.log_weight;
   fused.weight = h.weight;
+  fused.most_weight = h.most_weight;
   releaseEntries(h);
   h = std::move(fused);
 }

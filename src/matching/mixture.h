@@ -17,19 +17,24 @@ namespace active_matching_slam {
 /// Likelihood of what a search of a feature brings, divided by that of nothing but clutter (Chli
 /// 2009, eq. 5.5-5.8): no power of the number of pixels is ever formed.
 struct SearchLikelihood {
+  double true_positive = 0.0;
   double in = 0.0;            ///< the feature is inside and was missed: Pfn / Ptn
   double match = 0.0;         ///< one of the matches is the feature: Ptp / Pfp
   double child_log = 0.0;     ///< c ln(c), c = match * mass of a whole ellipse
   double clutter_odds = 0.0;  ///< Pfp / Ptn
 
   explicit SearchLikelihood(const FeatureRates& rates)
-      : in((1.0 - rates.true_positive) / (1.0 - rates.false_positive)),
+      : true_positive(rates.true_positive),
+        in((1.0 - rates.true_positive) / (1.0 - rates.false_positive)),
         match(rates.true_positive / rates.false_positive),
         clutter_odds(rates.false_positive / (1.0 - rates.false_positive)) {
     const double child = match * kEllipseMass;
     child_log = child * std::log(child);
   }
 };
+
+/// Of a hypothesis that is worth a second look, once.
+constexpr double kRunnerUpWeight = 0.1;
 
 /// One Gaussian of the mixture: a scenario of matches, and what it expects of the features left.
 struct Hypothesis {
@@ -53,6 +58,8 @@ struct Hypothesis {
   };
   int id = 0, parent = -1;
   double log_weight = 0.0, weight = 1.0;
+  double most_weight = 1.0;  ///< it ever had
+  bool was_searched = false;
   double log_merged = 0.0;  ///< what merged siblings added to log_weight
   std::shared_ptr<const Conditional> joint;
   std::vector<Eigen::Vector2d> mean;    ///< F, the match for a fused feature [px]
@@ -112,6 +119,9 @@ class Mixture {
   /// is known but outside the ellipses that g or its ancestors searched.
   bool isSterile(int g, int c);
 
+  /// The hypothesis that is to be heard before anything else is searched; -1: none.
+  int unheard() const;
+
   /// Searches candidate c of hypothesis g and updates the mixture. `step` gets what came of it.
   void searchAndUpdate(int g, int c, MatchStep& step);
   /// Fuses a match of the candidate's feature into g, just searched, without asking the others; g
@@ -132,6 +142,19 @@ class Mixture {
   /// it is dropped. Here it takes up what was found, match by match, each expected where the ones
   /// before tell: the evidence is the joint density of all its matches.
   std::vector<Explanation> recount() const;
+
+  /// Whether the heaviest hypothesis misses more features than their rates explain. Where structure
+  /// repeats, one that is wrong finds a good part of the features, and each of those speaks against
+  /// the true one, which is dropped before anything was searched where it expects it.
+  bool heaviestFallsShort() const;
+  /// Sets the hypotheses aside for the recount, and begins anew with the one of them, or of those
+  /// dropped, that was likeliest once and has not been searched to its end. False if there is none.
+  bool beginRunnerUp();
+
+  /// Whether the options ask for recount(), and the rule of update allows it.
+  bool recounts() const {
+    return options_.recount && options_.update_rule == UpdateRule::kIncremental;
+  }
 
   int mostGaussians() const { return most_gaussians_; }
   bool wasCapped() const { return was_capped_; }
@@ -156,10 +179,11 @@ class Mixture {
   };
 
   /// Whether others found matches that may be its own.
-  bool recounts() const {
-    return options_.recount && options_.update_rule == UpdateRule::kIncremental;
-  }
   bool lags(const Hypothesis& h) const;
+  bool awaitsHearing(const Hypothesis& h) const {
+    return options_.hearing_weight > 0.0 && !h.was_searched &&
+           h.most_weight >= options_.hearing_weight && h.hasOpenCandidate();
+  }
   /// What was found for a feature, as a hypothesis that expects it so sees it.
   struct View {
     SearchEllipse expected;
@@ -211,7 +235,8 @@ class Mixture {
   bool was_capped_ = false;
   // For recount()
   std::vector<int> first_searched_;  // features, in order
-  std::vector<Hypothesis> aside_;    // dropped while they lagged
+  std::vector<Hypothesis> aside_;    // dropped while they lagged, or were likely once
+  std::vector<Hypothesis> ended_;    // searched to their end, or passed over, before a runner-up
   double kept_ = 1.0;                // probability of all that was not dropped otherwise
 };
 

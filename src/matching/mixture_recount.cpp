@@ -17,6 +17,8 @@ namespace {
 constexpr std::size_t kCompared = 16, kContradicted = 8;
 /// Others are predicted from so many at most.
 constexpr std::size_t kMostKnown = 32;
+/// Features missed beyond what their rates explain that make one doubt.
+constexpr double kSurpriseSigmas = 3.0;
 
 std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
@@ -160,7 +162,7 @@ std::vector<int> Mixture::contradictions(const Hypothesis& a, const Hypothesis& 
 
 std::vector<Explanation> Mixture::recount() const {
   const Hypothesis& leader = hypotheses_[slot(heaviest())];
-  if (hypotheses_.size() + aside_.size() == 1) return {{&leader, leader.match, kept_}};
+  if (hypotheses_.size() + aside_.size() + ended_.size() == 1) return {{&leader, leader.match, kept_}};
   const std::vector<int> first(first_searched_.begin(),
                                first_searched_.begin() + static_cast<std::ptrdiff_t>(std::min(
                                                              first_searched_.size(), kCompared)));
@@ -177,6 +179,7 @@ std::vector<Explanation> Mixture::recount() const {
     sum += std::exp(evidence.log_any - base);
   };
   for (const Hypothesis& h : hypotheses_) judge(h);
+  for (const Hypothesis& h : ended_) judge(h);
   for (const Hypothesis& h : aside_) judge(h);
   for (Explanation& e : explanations) e.probability *= kept_ / sum;
   std::stable_sort(
@@ -187,6 +190,45 @@ std::vector<Explanation> Mixture::recount() const {
   if (accepted.hypothesis != &leader && first_searched_.size() > first.size())
     accepted.match = evidenceOf(*accepted.hypothesis, first_searched_).match;
   return explanations;
+}
+
+bool Mixture::heaviestFallsShort() const {
+  const Hypothesis& h = hypotheses_[slot(heaviest())];
+  double missed = 0.0, expected = 0.0, variance = 0.0;
+  for (int f = 0; f < features(); ++f) {
+    if (h.lineage[slot(f)] < 0 && !h.isFused(f)) continue;  // never searched
+    const double found = likelihood(f).true_positive * kEllipseMass;
+    missed += !h.isFused(f);
+    expected += 1.0 - found;
+    variance += found * (1.0 - found);
+  }
+  return missed > expected + kSurpriseSigmas * std::sqrt(variance) + 1.0;
+}
+
+bool Mixture::beginRunnerUp() {
+  const int first = heaviest();
+  for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
+    Hypothesis& h = hypotheses_[slot(k)];
+    releaseEntries(h);
+    if (k != first) (h.hasOpenCandidate() ? aside_ : ended_).push_back(std::move(h));
+  }
+  Hypothesis done = std::move(hypotheses_[slot(first)]);
+  hypotheses_.clear();
+  const auto next = std::max_element(
+      aside_.begin(), aside_.end(),
+      [](const Hypothesis& a, const Hypothesis& b) { return a.most_weight < b.most_weight; });
+  if (next == aside_.end() || next->most_weight < kRunnerUpWeight) {
+    hypotheses_.push_back(std::move(done));
+    return false;
+  }
+  hypotheses_.push_back(std::move(*next));
+  Hypothesis& begun = hypotheses_.front();
+  begun.entry.assign(begun.entry.size(), PairTable::kNone);
+  begun.weight = 1.0;
+  begun.log_weight = 0.0;
+  aside_.erase(next);
+  ended_.push_back(std::move(done));
+  return true;
 }
 
 }  // namespace active_matching_slam

@@ -45,15 +45,30 @@ void MixtureRun::run(MatchResult& result) {
   MatchStatistics& statistics = result.statistics;
   statistics.information_bits_start = informationLeft(mixture_.hypotheses().front());
   const double correlation_before = ledger_.correlationSeconds();
-  double information_s = 0.0;
   const double start = ledger_.now();
+  double information_s = searchToEnd(result);
+  int runners_up = mixture_.recounts() ? options_.runners_up : 0;
+  while (runners_up-- > 0 && !statistics.cut_short && mixture_.heaviestFallsShort() &&
+         mixture_.beginRunnerUp()) {
+    latched_ = false;
+    information_s += searchToEnd(result);
+  }
+  statistics.cut_short |= mixture_.wasCapped();
+  report(result);
+  const double correlation_s = ledger_.correlationSeconds() - correlation_before;
+  statistics.information_ms += 1e3 * information_s;
+  statistics.mixture_ms += 1e3 * (ledger_.now() - start - information_s - correlation_s);
+}
+
+double MixtureRun::searchToEnd(MatchResult& result) {
+  double information_s = 0.0;
   while (!isFinished()) {
     const bool dominates =
         policy_ == Policy::kFast && latched_ &&
         mixture_.hypotheses()[slot(mixture_.heaviest())].weight > options_.fast_accept_weight;
     const bool must_end = ledger_.budgetUsed() >= kBudgetForDoubt;
     if (dominates || must_end) {
-      statistics.cut_short |= must_end;
+      result.statistics.cut_short |= must_end;
       if (!latched_) latch();
       acceptNearest(result);
       break;
@@ -66,11 +81,7 @@ void MixtureRun::run(MatchResult& result) {
     mixture_.searchAndUpdate(next.hypothesis, next.candidate, step);
     record(std::move(step), result);
   }
-  statistics.cut_short |= mixture_.wasCapped();
-  report(result);
-  const double correlation_s = ledger_.correlationSeconds() - correlation_before;
-  statistics.information_ms += 1e3 * information_s;
-  statistics.mixture_ms += 1e3 * (ledger_.now() - start - information_s - correlation_s);
+  return information_s;
 }
 
 bool MixtureRun::isFinished() const {
@@ -80,6 +91,11 @@ bool MixtureRun::isFinished() const {
 }
 
 Measurement MixtureRun::choose() {
+  const int unheard = mixture_.unheard();
+  if (unheard >= 0) {
+    const Measurement next = choice_.bestOf(unheard);
+    if (next.exists()) return next;
+  }
   if (latched_) return chooseAfterLatch();
   if (policy_ == Policy::kFast) {
     double most_bits = 0.0;
@@ -178,9 +194,8 @@ std::vector<int> MixtureRun::matchesOf(const Explanation& e) const {
 }
 
 void MixtureRun::report(MatchResult& result) const {
-  const bool recounts = options_.recount && options_.update_rule == UpdateRule::kIncremental;
   const std::vector<Explanation> all =
-      recounts && !ledger_.isOverBudget() ? mixture_.recount() : mixture_.explanations();
+      mixture_.recounts() && !ledger_.isOverBudget() ? mixture_.recount() : mixture_.explanations();
   const Explanation& accepted = all.front();
   MatchStatistics& statistics = result.statistics;
   statistics.max_gaussians = mixture_.mostGaussians();

@@ -23,6 +23,8 @@ class MixtureRun {
   void run(MatchResult& result);
 
  private:
+  /// Seconds spent on choosing.
+  double searchToEnd(MatchResult& result);
   /// The next search, none when done. Sets the latch.
   Measurement choose();
   Measurement chooseAfterLatch();

@@ -217,7 +217,11 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
   const auto limit = slot(options_.max_gaussians);
   const auto dropLight = [&] {
     entries.erase(std::remove_if(entries.begin(), entries.end(),
-                                 [&](const Entry& e) { return e.weight < least; }),
+                                 [&](const Entry& e) {
+                                   return e.weight < least &&
+                                          !(e.index < old_count &&
+                                            awaitsHearing(hypotheses_[slot(e.index)]));
+                                 }),
                   entries.end());
   };
   dropLight();
@@ -251,8 +255,12 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
   }
   if (!lives[slot(g)]) releaseEntries(hypotheses_[slot(g)]);
   for (int k = 0; k < old_count && recounts(); ++k) {
-    if (lives[slot(k)] || aside_.size() >= kMostAside || !lags(hypotheses_[slot(k)])) continue;
-    aside_.push_back(std::move(hypotheses_[slot(k)]));
+    if (lives[slot(k)] || aside_.size() >= kMostAside) continue;
+    Hypothesis& dropped = hypotheses_[slot(k)];
+    // The searcher itself is dropped for its own child: all but its last match lives on in that.
+    const bool is_runner_up = k != g && dropped.most_weight >= kRunnerUpWeight;
+    if (!is_runner_up && !lags(dropped)) continue;
+    aside_.push_back(std::move(dropped));
     kept += weights[slot(k)];
   }
   kept_ *= kept;
@@ -263,6 +271,8 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
     next.back().id = e.id;
     next.back().parent = e.parent;
     next.back().weight = e.weight;
+    next.back().most_weight =
+        e.index < old_count ? std::max(next.back().most_weight, e.weight) : e.weight;
     next.back().log_weight = std::log(e.weight);
   }
   hypotheses_ = std::move(next);

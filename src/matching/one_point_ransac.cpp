@@ -23,6 +23,27 @@ std::vector<int> drawHypotheses(std::vector<int> voters, const MatchOptions& opt
   return voters;
 }
 
+/// Of all matches together from what the prior expects.
+double jointDistance2(const ProperPrior& prior, const SearchLedger& ledger,
+                      const std::vector<int>& match_of_feature) {
+  std::vector<int> matched;
+  for (int f = 0; f < prior.size(); ++f)
+    if (match_of_feature[static_cast<std::size_t>(prior.original(f))] >= 0) matched.push_back(f);
+  const int n = static_cast<int>(matched.size());
+  Eigen::MatrixXd S(2 * n, 2 * n);
+  Eigen::VectorXd innovation(2 * n);
+  for (int a = 0; a < n; ++a) {
+    const int f = matched[static_cast<std::size_t>(a)];
+    const int match = match_of_feature[static_cast<std::size_t>(prior.original(f))];
+    innovation.segment<2>(2 * a) =
+        ledger.matches(f)[static_cast<std::size_t>(match)].pixel - prior.mean(f);
+    for (int b = 0; b < n; ++b)
+      S.block<2, 2>(2 * a, 2 * b) =
+          prior.S().block<2, 2>(2 * f, 2 * matched[static_cast<std::size_t>(b)]);
+  }
+  return S.llt().matrixL().solve(innovation).squaredNorm();
+}
+
 /// One frame's problem: `best[f]` is the match of highest score in the prior's gate, or -1.
 class OnePointRansac {
  public:
@@ -127,6 +148,7 @@ MatchResult OnePointRansacMatcher::match(const MeasurementPrior& given, FeatureS
     for (const int i : inliers)
       result.match_of_feature[static_cast<std::size_t>(prior.original(i))] =
           best[static_cast<std::size_t>(i)];
+    result.statistics.mahalanobis2 = jointDistance2(prior, ledger, result.match_of_feature);
   }
   ledger.finish(result);
   return result;

@@ -15,6 +15,7 @@ constexpr double kPoorShare = 0.6, kPoorShareWhenAmbiguous = 0.8;
 /// Of JCBB's joint squared distance: 1 is what the truth has on average when the filter's noise is
 /// what it is told, less when it is told more, and chance fills the whole gate of 1.2 to 1.5.
 constexpr double kCloseChi2PerDegree = 0.5;
+constexpr double kFarChi2PerDegree = 1.0;  ///< of RANSAC's
 constexpr double kLeastShare = 0.1;    ///< of the matches expected: fewer are chance
 constexpr int kFewPoorFrames = 2;      ///< after more, no second opinion
 constexpr double kMajority = 0.5;      ///< of the matches expected, for JCBB's to count
@@ -173,7 +174,7 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     if (!is_settled && frame->matching.statistics.matched <= kPoorShare * expected)
       askToo(*consensus_matcher_, prior_, kOpinionShare,
              std::max(kClearlyMore * frame->matching.statistics.matched, kLeastShare * expected),
-             0.0, image, frame);
+             kFarChi2PerDegree, image, frame);
   }
   MatchResult& result = frame->matching;
   if (result.statistics.matched >= kLeastShare * expected) return;

@@ -18,7 +18,7 @@ struct ImageMotion {
 
 /// Aligns small, smoothed copies of two 8-bit grey images of one size (Klein and Murray 2008,
 /// section 4) by the enhanced correlation coefficient (Evangelidis and Psarakis 2008), from `guess`
-/// on. Empty when they have little in common.
+/// on. Empty when they have little in common, or when they fit in another place as well.
 std::optional<ImageMotion> estimateImageMotion(const cv::Mat& previous, const cv::Mat& image,
                                                const ImageMotion& guess);
 

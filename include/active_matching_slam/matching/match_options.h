@@ -24,6 +24,12 @@ struct MatchOptions {
   /// Rule incremental: at the end all hypotheses, some of the dropped ones too, are judged anew by
   /// all that was found, and the most probable one is accepted; else the heaviest Gaussian is.
   bool recount = true;
+  /// A Gaussian that has weighed this, and has lost most of it to matches of others before it was
+  /// searched itself, is not dropped until it has been, which is done at once; 0: never.
+  double hearing_weight = 0.1;
+  /// With recount, when the accepted hypothesis misses more features than their rates explain: so
+  /// many of those that were likely once are searched to their end too, and judged with it.
+  int runners_up = 2;
   int max_gaussians = 0;  ///< cap on the live mixture; the lightest go first; 0: no cap
   /// Siblings, Gaussians born of one search, become one where they differ by less than so many
   /// sigma in what they expect of every other feature; 0: never. The better one stays, with the

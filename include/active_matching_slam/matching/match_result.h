@@ -61,7 +61,7 @@ struct MatchStatistics {
   int degenerate_features = 0;  ///< left out because their prediction was not a proper Gaussian
   std::int64_t nodes = 0;       ///< jcbb: nodes visited; one_point_ransac: hypotheses
   int inliers = 0;            ///< one_point_ransac: low-innovation inliers, the hypothesis included
-  double mahalanobis2 = 0.0;  ///< jcbb: joint squared distance of all pairings
+  double mahalanobis2 = 0.0;  ///< jcbb, one_point_ransac: joint squared distance of all pairings
   // Durations [ms]
   double information_ms = 0.0;
   double correlation_ms = 0.0;

@@ -114,6 +114,16 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matching.prune_weight, 0.0, 0.5);
   visit(F{"matching/recount", "judge all hypotheses anew at the end, dropped ones too", true},
         o.matching.recount);
+  visit(F{"matching/hearing_weight",
+          "a Gaussian that has weighed this is not dropped before it has been searched itself; 0: "
+          "never",
+          true},
+        o.matching.hearing_weight, 0.0, 1.0);
+  visit(F{"matching/runners_up",
+          "hypotheses that were likely once, and are searched to their end when the accepted one "
+          "misses too much; needs recount",
+          true},
+        o.matching.runners_up, 0, 100);
   visit(F{"matching/max_gaussians", "cap on the mixture; 0: none", true}, o.matching.max_gaussians,
         0, 100000);
   visit(

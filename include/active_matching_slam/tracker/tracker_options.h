@@ -24,7 +24,6 @@ inline MatchOptions liveMatchOptions() {
   MatchOptions options;
   options.latch_information_bits = 0.1;
   options.max_gaussians = 50;
-  options.recount = false;  // costs time, and the poses on recordings are no better for it
   options.merge_sigmas = 0.5;
   options.ambiguous_below_weight = 0.3;
   options.default_rates.true_positive = 0.8;

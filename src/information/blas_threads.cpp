@@ -1,4 +1,4 @@
-#include "active_matching_slam/filter/blas_threads.h"
+#include "active_matching_slam/information/blas_threads.h"
 
 // Weak: null where the BLAS is another one.
 extern "C" void openblas_set_num_threads(int threads) __attribute__((weak));
