@@ -22,21 +22,39 @@ bool isEntirelyRight(const SimulatedProblem& problem, const PointListSearch& sea
   return true;
 }
 
+int wrongMatches(const SimulatedProblem& problem, const PointListSearch& search,
+                 const std::vector<int>& matches) {
+  int wrong = 0;
+  for (int f = 0; f < problem.prior.size(); ++f) {
+    const int match = matches[static_cast<std::size_t>(f)];
+    wrong += match >= 0 && search.matches(f)[static_cast<std::size_t>(match)].id !=
+                               problem.true_point[static_cast<std::size_t>(f)];
+  }
+  return wrong;
+}
+
 struct Score {
   int right = 0;
+  int clean = 0;  ///< without a wrong match
   double pixels = 0.0;
 };
 
-Score scoreOf(const std::string& matcher, const SimulatedProblemOptions& options, int frames) {
+MatchOptions boundedMixture() {
+  MatchOptions options;
+  options.max_gaussians = 64;
+  return options;
+}
+
+Score scoreOf(const std::string& matcher, const SimulatedProblemOptions& options, int frames,
+              const MatchOptions& match_options = boundedMixture()) {
   ProblemSimulator simulator(options, 11);
-  MatchOptions match_options;
-  match_options.max_gaussians = 64;
   Score score;
   for (int n = 0; n < frames; ++n) {
     const SimulatedProblem problem = simulator.next();
     PointListSearch search = problem.search();
     const MatchResult result = createMatcher(matcher)->match(problem.prior, search, match_options);
     score.right += isEntirelyRight(problem, search, result.match_of_feature);
+    score.clean += wrongMatches(problem, search, result.match_of_feature) == 0;
     score.pixels += static_cast<double>(result.statistics.pixels_searched);
   }
   return score;
@@ -55,6 +73,44 @@ TEST(ActiveMatching, IsRightMoreOftenThanJcbbWhereStructureRepeats) {
   options.false_positive = 1e-4;
   options.repeated_share = 0.5;
   EXPECT_GT(scoreOf("active", options, 500).right, scoreOf("jcbb", options, 500).right);
+}
+
+/// A board on which every corner has its like in all directions, seen by a hasty camera.
+SimulatedProblemOptions boardOfLikes() {
+  SimulatedProblemOptions options;
+  options.features = 40;
+  options.repeated_share = 1.0;
+  options.true_positive = 0.97;
+  options.noise_sigma_px = 0.5;
+  options.map_sigma_m = 0.001;
+  options.acceleration = options.angular_acceleration = 12.0;
+  return options;
+}
+
+TEST(ActiveMatching, IsMisledLessOftenThanJcbbAndRansacWhereEverythingRepeats) {
+  const int frames = 100, jcbb = scoreOf("jcbb", boardOfLikes(), frames).clean,
+            ransac = scoreOf("one_point_ransac", boardOfLikes(), frames).clean;
+  for (const char* matcher : {"active", "fast_active", "chow_liu"}) {
+    const int clean = scoreOf(matcher, boardOfLikes(), frames).clean;
+    EXPECT_GT(clean, jcbb) << matcher;
+    EXPECT_GT(clean, ransac) << matcher;
+  }
+  EXPECT_GE(scoreOf("active", boardOfLikes(), frames).clean, 90);
+}
+
+TEST(ActiveMatching, IsMisledLessOftenWhenAGaussianIsHeardBeforeItIsDropped) {
+  MatchOptions does_not = boundedMixture();
+  does_not.hearing_weight = 0.0;
+  EXPECT_GT(scoreOf("active", boardOfLikes(), 200).clean,
+            scoreOf("active", boardOfLikes(), 200, does_not).clean);
+}
+
+TEST(ActiveMatching, IsMisledLessOftenWhenRunnersUpAreSearchedToTheirEnd) {
+  MatchOptions asks = boundedMixture(), does_not = asks;
+  asks.hearing_weight = does_not.hearing_weight = 0.0;
+  does_not.runners_up = 0;
+  EXPECT_GT(scoreOf("active", boardOfLikes(), 200, asks).clean,
+            scoreOf("active", boardOfLikes(), 200, does_not).clean);
 }
 
 /// Whether what is claimed is what happens, in every bin of weights and in all frames together.

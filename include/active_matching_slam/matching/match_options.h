@@ -26,7 +26,7 @@ struct MatchOptions {
   bool recount = true;
   /// A Gaussian that has weighed this, and has lost most of it to matches of others before it was
   /// searched itself, is not dropped until it has been, which is done at once; 0: never.
-  double hearing_weight = 0.1;
+  double hearing_weight = 0.01;
   /// With recount, when the accepted hypothesis misses more features than their rates explain: so
   /// many of those that were likely once are searched to their end too, and judged with it.
   int runners_up = 2;
