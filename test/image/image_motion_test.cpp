@@ -26,6 +26,14 @@ double farthest(const ImageMotion& a, const ImageMotion& b) {
   return distance;
 }
 
+cv::Mat checkerboard(int width, int height, int square) {
+  cv::Mat board(height, width, CV_8UC1);
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u)
+      board.at<std::uint8_t>(v, u) = (u / square + v / square) % 2 == 0 ? 40 : 200;
+  return board;
+}
+
 TEST(ImageMotionOf, AShiftIsFound) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const WaveTexture texture(seed, 60.0);
@@ -60,6 +68,23 @@ TEST(ImageMotionOf, ATurnIsFoundThroughAChangeOfExposure) {
   const auto motion = estimateImageMotion(previous, image, {});
   ASSERT_TRUE(motion);
   EXPECT_LT(farthest(*motion, truth), motion->sigma_px);
+}
+
+TEST(ImageMotionOf, ASceneThatRepeatsItselfIsFoundWhereItIsOrNotAtAll) {
+  int found = 0;
+  for (int square = 20; square <= 40; square += 2) {
+    const cv::Mat boards = checkerboard(2 * kWidth, 2 * kHeight, square);
+    const int u = kWidth / 2, v = kHeight / 2;
+    for (const int shift : {square / 3, square / 2, 2 * square / 3}) {
+      const auto motion = estimateImageMotion(
+          boards(cv::Rect(u, v, kWidth, kHeight)),
+          boards(cv::Rect(u + shift, v - shift / 2, kWidth, kHeight)), shiftedBy(-shift, shift / 2));
+      if (!motion) continue;
+      ++found;
+      EXPECT_LT(farthest(*motion, shiftedBy(-shift, shift / 2)), square) << square << ", " << shift;
+    }
+  }
+  EXPECT_GT(found, 10);
 }
 
 TEST(ImageMotionOf, WhatCantBeComparedHasNone) {
