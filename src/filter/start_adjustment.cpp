@@ -12,7 +12,10 @@ namespace {
 
 /// Parallax to the first image [px]: adjusted first at, then whenever it has grown by a factor, and
 /// no more beyond.
-constexpr double kFirstParallaxPx = 0.5, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
+constexpr double kFirstParallaxPx = 0.3, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
+/// The prior of a new feature's depth is that of one map and place. Where a scene goes from near to
+/// far it would rather bend the motion than let depths differ, while the parallax is small.
+constexpr double kDepthFreedom = 10.0;
 constexpr double kGrowthInDoubt = 1.25;    ///< the factor when the images leave a doubt
 constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
 constexpr std::size_t kMostImages = 24;    ///< kept
@@ -278,7 +281,7 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
   options.sigma_px = filter.options().sigma_px;
   options.inverse_depth = filter.options().initial_inverse_depth;
-  options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
+  options.sigma_inverse_depth = kDepthFreedom * filter.options().initial_sigma_inverse_depth;
   options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
 
   // Some of the images are enough to tell the readings apart.

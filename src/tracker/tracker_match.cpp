@@ -167,7 +167,7 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   if (poor_frames_ <= kFewPoorFrames) {
     bool is_settled = false;
     const int matched = frame->matching.statistics.matched;
-    if (frame->matching.statistics.ambiguous && isPoor())
+    if (isPoor())
       is_settled =
           askToo(*longest_matcher_, prior_, kOpinionShare,
                  std::max(1.0 * matched, kMajority * expected), kCloseChi2PerDegree, image, frame);

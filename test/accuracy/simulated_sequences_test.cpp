@@ -22,8 +22,10 @@ struct SimulatedRun {
   std::vector<Eigen::Matrix<double, 6, 6>> covariances;
 };
 
-SimulatedRun trackSimulation(const std::string& motion, std::uint64_t seed) {
+SimulatedRun trackSimulation(const std::string& motion, std::uint64_t seed,
+                             const std::string& scene = "room") {
   SimulatorOptions simulation;
+  simulation.scene = scene;
   simulation.motion = motion;
   simulation.seed = seed;
   simulation.width = 320;
@@ -65,6 +67,23 @@ std::vector<double> poseNees(const SimulatedRun& run, double scale) {
   }
   std::sort(nees.begin(), nees.end());
   return nees;
+}
+
+/// Scenes that go from near to very far, in which the first images are most easily misread.
+TEST(SimulatedDepths, OfAllKindsAreReadRightlyFromTheFirstImages) {
+  for (const auto& [scene, motion] : {std::make_pair("corridor", "slow"),
+                                      std::make_pair("walkway", "forward"),
+                                      std::make_pair("office", "circle")}) {
+    const SimulatedRun run = trackSimulation(motion, 11, scene);
+    EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames) << scene;
+    const auto pairs = pairPoses(run.tracked, run.truth);
+    const auto alignment = align(pairs, AlignmentKind::kSimilarity);
+    ASSERT_TRUE(alignment) << scene;
+    const double error = absoluteTrajectoryError(pairs, *alignment);
+    const double path = measureExcursion(run.truth).path_length;
+    EXPECT_LT(error, 0.01 * path) << scene;
+    std::printf("%s, %s: error %.2f %% of the path\n", scene, motion, 100.0 * error / path);
+  }
 }
 
 class SimulatedSequences : public testing::TestWithParam<std::tuple<const char*, int>> {};
