@@ -9,7 +9,7 @@ namespace active_matching_slam {
 namespace {
 
 constexpr int kCoarseWidth = 40, kFineWidth = 80;  ///< of the copies [px]
-constexpr double kSmoothing = 2.0;   ///< standard deviation [px of the copies]
+constexpr double kSmoothing = 2.0;                 ///< standard deviation [px of the copies]
 constexpr double kLeastCorrelation = 0.75;
 constexpr double kSigma = 0.75;  ///< of the result [px of the finest copies]
 /// Of what the correlation lacks to 1: of two alignments at different places one must leave less

@@ -162,7 +162,8 @@ std::vector<int> Mixture::contradictions(const Hypothesis& a, const Hypothesis& 
 
 std::vector<Explanation> Mixture::recount() const {
   const Hypothesis& leader = hypotheses_[slot(heaviest())];
-  if (hypotheses_.size() + aside_.size() + ended_.size() == 1) return {{&leader, leader.match, kept_}};
+  if (hypotheses_.size() + aside_.size() + ended_.size() == 1)
+    return {{&leader, leader.match, kept_}};
   const std::vector<int> first(first_searched_.begin(),
                                first_searched_.begin() + static_cast<std::ptrdiff_t>(std::min(
                                                              first_searched_.size(), kCompared)));

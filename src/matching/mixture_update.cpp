@@ -216,13 +216,13 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
   double least = std::min(options_.prune_weight, heaviest);
   const auto limit = slot(options_.max_gaussians);
   const auto dropLight = [&] {
-    entries.erase(std::remove_if(entries.begin(), entries.end(),
-                                 [&](const Entry& e) {
-                                   return e.weight < least &&
-                                          !(e.index < old_count &&
-                                            awaitsHearing(hypotheses_[slot(e.index)]));
-                                 }),
-                  entries.end());
+    entries.erase(
+        std::remove_if(entries.begin(), entries.end(),
+                       [&](const Entry& e) {
+                         return e.weight < least &&
+                                !(e.index < old_count && awaitsHearing(hypotheses_[slot(e.index)]));
+                       }),
+        entries.end());
   };
   dropLight();
   if (limit > 0 && entries.size() > limit) {

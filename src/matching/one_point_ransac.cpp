@@ -23,25 +23,39 @@ std::vector<int> drawHypotheses(std::vector<int> voters, const MatchOptions& opt
   return voters;
 }
 
+/// Image points of some features together: what they differ from the prior by, and its covariance.
+struct Stacked {
+  Eigen::VectorXd innovation;
+  Eigen::MatrixXd S;
+};
+
+Stacked stack(const ProperPrior& prior, const std::vector<int>& features,
+              const std::vector<Eigen::Vector2d>& pixels) {
+  const int n = static_cast<int>(features.size());
+  Stacked stacked{Eigen::VectorXd(2 * n), Eigen::MatrixXd(2 * n, 2 * n)};
+  for (int a = 0; a < n; ++a) {
+    const int i = features[static_cast<std::size_t>(a)];
+    stacked.innovation.segment<2>(2 * a) = pixels[static_cast<std::size_t>(a)] - prior.mean(i);
+    for (int b = 0; b < n; ++b)
+      stacked.S.block<2, 2>(2 * a, 2 * b) =
+          prior.S().block<2, 2>(2 * i, 2 * features[static_cast<std::size_t>(b)]);
+  }
+  return stacked;
+}
+
 /// Of all matches together from what the prior expects.
 double jointDistance2(const ProperPrior& prior, const SearchLedger& ledger,
                       const std::vector<int>& match_of_feature) {
   std::vector<int> matched;
-  for (int f = 0; f < prior.size(); ++f)
-    if (match_of_feature[static_cast<std::size_t>(prior.original(f))] >= 0) matched.push_back(f);
-  const int n = static_cast<int>(matched.size());
-  Eigen::MatrixXd S(2 * n, 2 * n);
-  Eigen::VectorXd innovation(2 * n);
-  for (int a = 0; a < n; ++a) {
-    const int f = matched[static_cast<std::size_t>(a)];
+  std::vector<Eigen::Vector2d> pixels;
+  for (int f = 0; f < prior.size(); ++f) {
     const int match = match_of_feature[static_cast<std::size_t>(prior.original(f))];
-    innovation.segment<2>(2 * a) =
-        ledger.matches(f)[static_cast<std::size_t>(match)].pixel - prior.mean(f);
-    for (int b = 0; b < n; ++b)
-      S.block<2, 2>(2 * a, 2 * b) =
-          prior.S().block<2, 2>(2 * f, 2 * matched[static_cast<std::size_t>(b)]);
+    if (match < 0) continue;
+    matched.push_back(f);
+    pixels.push_back(ledger.matches(f)[static_cast<std::size_t>(match)].pixel);
   }
-  return S.llt().matrixL().solve(innovation).squaredNorm();
+  const Stacked all = stack(prior, matched, pixels);
+  return all.S.llt().matrixL().solve(all.innovation).squaredNorm();
 }
 
 /// One frame's problem: `best[f]` is the match of highest score in the prior's gate, or -1.
@@ -74,18 +88,12 @@ class OnePointRansac {
                            const std::vector<std::vector<int>>& gates, double gate2) const {
     std::vector<int> rescued(static_cast<std::size_t>(prior_.size()), -1);
     const int n = 2 * static_cast<int>(inliers.size());
-    Eigen::MatrixXd S_ii(n, n);
-    Eigen::VectorXd innovation(n);
-    for (int a = 0; a < n / 2; ++a) {
-      const int i = inliers[static_cast<std::size_t>(a)];
-      innovation.segment<2>(2 * a) = bestPixel(i) - prior_.mean(i);
-      for (int b = 0; b < n / 2; ++b)
-        S_ii.block<2, 2>(2 * a, 2 * b) =
-            prior_.S().block<2, 2>(2 * i, 2 * inliers[static_cast<std::size_t>(b)]);
-    }
-    const Eigen::LLT<Eigen::MatrixXd> llt(S_ii);
+    std::vector<Eigen::Vector2d> pixels;
+    for (const int i : inliers) pixels.push_back(bestPixel(i));
+    const Stacked stacked = stack(prior_, inliers, pixels);
+    const Eigen::LLT<Eigen::MatrixXd> llt(stacked.S);
     if (llt.info() != Eigen::Success) return rescued;
-    const Eigen::VectorXd y = llt.matrixL().solve(innovation);
+    const Eigen::VectorXd y = llt.matrixL().solve(stacked.innovation);
     std::vector<bool> is_inlier(static_cast<std::size_t>(prior_.size()), false);
     for (const int i : inliers) is_inlier[static_cast<std::size_t>(i)] = true;
     Eigen::MatrixXd cross(n, 2);

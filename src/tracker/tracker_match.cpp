@@ -16,10 +16,10 @@ constexpr double kPoorShare = 0.6, kPoorShareWhenAmbiguous = 0.8;
 /// what it is told, less when it is told more, and chance fills the whole gate of 1.2 to 1.5.
 constexpr double kCloseChi2PerDegree = 0.5;
 constexpr double kFarChi2PerDegree = 1.0;  ///< of RANSAC's
-constexpr double kLeastShare = 0.1;    ///< of the matches expected: fewer are chance
-constexpr int kFewPoorFrames = 2;      ///< after more, no second opinion
-constexpr double kMajority = 0.5;      ///< of the matches expected, for JCBB's to count
-constexpr double kClearlyMore = 1.25;  ///< matches, for RANSAC's to count
+constexpr double kLeastShare = 0.1;        ///< of the matches expected: fewer are chance
+constexpr int kFewPoorFrames = 2;          ///< after more, no second opinion
+constexpr double kMajority = 0.5;          ///< of the matches expected, for JCBB's to count
+constexpr double kClearlyMore = 1.25;      ///< matches, for RANSAC's to count
 /// Of the budget: the first attempt, the same under the image's own motion, and each opinion.
 constexpr double kFirstShare = 0.6, kGuidedShare = 0.2, kOpinionShare = 0.1;
 constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
@@ -134,9 +134,9 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
 /// - The same matcher under the motion of the image as a whole, for a camera that was jerked. Where
 ///   the ellipses are wide from the start, that comes first, and the filter's own prior second.
 /// - Where structure repeats in gates as wide as the image, a sequential matcher can lose the true
-///   hypothesis among hundreds of equals while all are still short: JCBB, which asks for the
-///   longest. Since that pairs whatever its test lets pass, it counts only if it agrees far better
-///   than it must.
+///   hypothesis among hundreds of equals while all are still short, and be sure of a wrong one:
+///   JCBB, which asks for the longest. Since that pairs whatever its test lets pass, it counts only
+///   if it agrees far better than it must.
 /// - A sequential matcher that follows something that moves by itself (a hand, a door) first, can
 ///   end up with that and little else: RANSAC.
 void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {

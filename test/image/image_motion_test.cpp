@@ -76,9 +76,10 @@ TEST(ImageMotionOf, ASceneThatRepeatsItselfIsFoundWhereItIsOrNotAtAll) {
     const cv::Mat boards = checkerboard(2 * kWidth, 2 * kHeight, square);
     const int u = kWidth / 2, v = kHeight / 2;
     for (const int shift : {square / 3, square / 2, 2 * square / 3}) {
-      const auto motion = estimateImageMotion(
-          boards(cv::Rect(u, v, kWidth, kHeight)),
-          boards(cv::Rect(u + shift, v - shift / 2, kWidth, kHeight)), shiftedBy(-shift, shift / 2));
+      const auto motion =
+          estimateImageMotion(boards(cv::Rect(u, v, kWidth, kHeight)),
+                              boards(cv::Rect(u + shift, v - shift / 2, kWidth, kHeight)),
+                              shiftedBy(-shift, shift / 2));
       if (!motion) continue;
       ++found;
       EXPECT_LT(farthest(*motion, shiftedBy(-shift, shift / 2)), square) << square << ", " << shift;
