@@ -12,9 +12,10 @@ namespace {
 
 /// Parallax to the first image [px]: adjusted first at, then whenever it has grown by a factor, and
 /// no more beyond.
-constexpr double kFirstParallaxPx = 0.3, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
-/// The prior of a new feature's depth is that of one map and place. Where a scene goes from near to
-/// far it would rather bend the motion than let depths differ, while the parallax is small.
+constexpr double kFirstParallaxPx = 0.5, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
+/// By so much wider than that of a new feature is the prior of depths while readings are told
+/// apart: in a scene that goes from near to far it would rather bend the motion than let depths
+/// differ.
 constexpr double kDepthFreedom = 10.0;
 constexpr double kGrowthInDoubt = 1.25;    ///< the factor when the images leave a doubt
 constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
@@ -281,7 +282,7 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
   options.sigma_px = filter.options().sigma_px;
   options.inverse_depth = filter.options().initial_inverse_depth;
-  options.sigma_inverse_depth = kDepthFreedom * filter.options().initial_sigma_inverse_depth;
+  options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
   options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
 
   // Some of the images are enough to tell the readings apart.
@@ -291,6 +292,7 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   flatten(model, options.inverse_depth, &readings[1]);
   std::vector<double> costs;
   BundleOptions telling = options;
+  telling.sigma_inverse_depth = kDepthFreedom * filter.options().initial_sigma_inverse_depth;
   for (std::size_t i = 0; i < 4; ++i) {
     if (i >= 2) {
       if (i == 3 && isSameReading(readings[0], readings[1])) break;

@@ -71,9 +71,8 @@ std::vector<double> poseNees(const SimulatedRun& run, double scale) {
 
 /// Scenes that go from near to very far, in which the first images are most easily misread.
 TEST(SimulatedDepths, OfAllKindsAreReadRightlyFromTheFirstImages) {
-  for (const auto& [scene, motion] : {std::make_pair("corridor", "slow"),
-                                      std::make_pair("walkway", "forward"),
-                                      std::make_pair("office", "circle")}) {
+  for (const auto& [scene, motion] :
+       {std::make_pair("corridor", "slow"), std::make_pair("office", "forward")}) {
     const SimulatedRun run = trackSimulation(motion, 11, scene);
     EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames) << scene;
     const auto pairs = pairPoses(run.tracked, run.truth);
