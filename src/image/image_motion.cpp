@@ -27,8 +27,19 @@ cv::Mat smallCopy(const cv::Mat& image, double scale) {
   return smooth;
 }
 
-/// Improves the motion on copies of that scale. Returns the correlation reached, 0 for none.
-double align(const cv::Mat& previous, const cv::Mat& image, double scale, ImageMotion* motion) {
+/// Both images at one scale.
+struct Copies {
+  Copies(const cv::Mat& previous_image, const cv::Mat& image, int width)
+      : scale(static_cast<double>(width) / image.cols),
+        previous(smallCopy(previous_image, scale)),
+        now(smallCopy(image, scale)) {}
+  double scale;
+  cv::Mat previous, now;
+};
+
+/// Improves the motion on the copies. Returns the correlation reached, 0 for none.
+double align(const Copies& copies, ImageMotion* motion) {
+  const double scale = copies.scale;
   // A pixel centre x is at scale x + offset in the copies.
   const Eigen::Vector2d offset = Eigen::Vector2d::Constant(0.5 * (scale - 1.0));
   const Eigen::Vector2d start = scale * motion->shift_px + offset - motion->turn * offset;
@@ -37,7 +48,7 @@ double align(const cv::Mat& previous, const cv::Mat& image, double scale, ImageM
   double correlation = 0.0;
   try {
     correlation = cv::findTransformECC(
-        smallCopy(previous, scale), smallCopy(image, scale), warp, cv::MOTION_EUCLIDEAN,
+        copies.previous, copies.now, warp, cv::MOTION_EUCLIDEAN,
         cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kMostSteps, kSmallGain),
         cv::noArray(), 1);
   } catch (const cv::Exception&) {  // OpenCV's way of saying that it did not converge
@@ -50,8 +61,6 @@ double align(const cv::Mat& previous, const cv::Mat& image, double scale, ImageM
   motion->shift_px = (shift - offset + motion->turn * offset) / scale;
   return correlation;
 }
-
-double scaleOf(int width, const cv::Mat& image) { return static_cast<double>(width) / image.cols; }
 
 /// Largest distance [px] between where two motions take a corner of the image.
 double farthestApart(const ImageMotion& a, const ImageMotion& b, const cv::Size& size) {
@@ -72,13 +81,13 @@ std::optional<ImageMotion> estimateImageMotion(const cv::Mat& previous, const cv
   // Coarse to fine reaches far; from the guess the fine copies alone find what is near. Where the
   // scene repeats itself these are two places, and one is right only if it fits clearly better.
   ImageMotion far = guess, near = guess;
-  const double coarse = scaleOf(kCoarseWidth, image), fine = scaleOf(kFineWidth, image);
+  const Copies fine(previous, image, kFineWidth);
   double of_far = 0.0;
-  if (align(previous, image, coarse, &far) > 0.0) of_far = align(previous, image, fine, &far);
-  const double of_near = align(previous, image, fine, &near);
+  if (align(Copies(previous, image, kCoarseWidth), &far) > 0.0) of_far = align(fine, &far);
+  const double of_near = align(fine, &near);
   const bool is_near = of_near > of_far;
   if (std::max(of_near, of_far) < kLeastCorrelation) return std::nullopt;
-  const double sigma_px = kSigma / fine;
+  const double sigma_px = kSigma / fine.scale;
   const double misfit = 1.0 - std::max(of_near, of_far), other = 1.0 - std::min(of_near, of_far);
   if (misfit > kClearlyBetter * other &&
       farthestApart(near, far, image.size()) > kSamePlaceSigmas * sigma_px)

@@ -22,10 +22,11 @@ std::vector<SearchLikelihood> likelihoodsOf(const MeasurementPrior& given, const
   return likelihoods;
 }
 
-double informationLeft(const Hypothesis& h) {
+/// Of the features without a match.
+double informationLeft(const Hypothesis& h, const std::vector<int>& match) {
   double bits = 0.0;
-  for (std::size_t f = 0; f < h.match.size(); ++f)
-    if (h.match[f] < 0) bits += h.joint->marginal(static_cast<int>(f)).information_bits;
+  for (std::size_t f = 0; f < match.size(); ++f)
+    if (match[f] < 0) bits += h.joint->marginal(static_cast<int>(f)).information_bits;
   return bits;
 }
 
@@ -43,7 +44,8 @@ MixtureRun::MixtureRun(const MeasurementPrior& given, const ProperPrior& prior, 
 
 void MixtureRun::run(MatchResult& result) {
   MatchStatistics& statistics = result.statistics;
-  statistics.information_bits_start = informationLeft(mixture_.hypotheses().front());
+  const Hypothesis& root = mixture_.hypotheses().front();
+  statistics.information_bits_start = informationLeft(root, root.match);
   const double correlation_before = ledger_.correlationSeconds();
   const double start = ledger_.now();
   double information_s = searchToEnd(result);
@@ -200,9 +202,7 @@ void MixtureRun::report(MatchResult& result) const {
   MatchStatistics& statistics = result.statistics;
   statistics.max_gaussians = mixture_.mostGaussians();
   statistics.accepted_weight = accepted.probability;
-  for (int f = 0; f < prior_.size(); ++f)
-    if (accepted.match[slot(f)] < 0)
-      statistics.information_bits_end += accepted.hypothesis->joint->marginal(f).information_bits;
+  statistics.information_bits_end = informationLeft(*accepted.hypothesis, accepted.match);
   statistics.dropped_probability = 1.0;
   for (const Explanation& e : all) {
     if (e.probability < options_.prune_weight && &e != &accepted) break;

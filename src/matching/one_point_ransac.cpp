@@ -32,13 +32,10 @@ struct Stacked {
 Stacked stack(const ProperPrior& prior, const std::vector<int>& features,
               const std::vector<Eigen::Vector2d>& pixels) {
   const int n = static_cast<int>(features.size());
-  Stacked stacked{Eigen::VectorXd(2 * n), Eigen::MatrixXd(2 * n, 2 * n)};
+  Stacked stacked{Eigen::VectorXd(2 * n), jointCovariance(prior.S(), features)};
   for (int a = 0; a < n; ++a) {
-    const int i = features[static_cast<std::size_t>(a)];
-    stacked.innovation.segment<2>(2 * a) = pixels[static_cast<std::size_t>(a)] - prior.mean(i);
-    for (int b = 0; b < n; ++b)
-      stacked.S.block<2, 2>(2 * a, 2 * b) =
-          prior.S().block<2, 2>(2 * i, 2 * features[static_cast<std::size_t>(b)]);
+    const auto slot = static_cast<std::size_t>(a);
+    stacked.innovation.segment<2>(2 * a) = pixels[slot] - prior.mean(features[slot]);
   }
   return stacked;
 }

@@ -193,14 +193,12 @@ void Tracker::Implementation::correct(TrackedFrame* frame) {
   }
   const int m = static_cast<int>(matched.size());
   Eigen::VectorXd innovation(2 * m);
-  Eigen::MatrixXd S(2 * m, 2 * m);
   for (int a = 0; a < m; ++a) {
     const SearchMatch& match =
         search_.matches(matched[a])[frame->matching.match_of_feature[matched[a]]];
     innovation.segment<2>(2 * a) = match.pixel - prior_.mean(matched[a]);
-    for (int b = 0; b < m; ++b)
-      S.block<2, 2>(2 * a, 2 * b) = prior_.S.block<2, 2>(2 * matched[a], 2 * matched[b]);
   }
+  const Eigen::MatrixXd S = jointCovariance(prior_.S, matched);
   for (int k : agreeingMeasurements(innovation, S, kAgreementChi2))
     fused_.push_back(
         {prior_.ids[matched[k]], prior_.mean(matched[k]) + innovation.segment<2>(2 * k), 0.0});

@@ -38,6 +38,14 @@ inline const Film& slowFilm() {
   return film;
 }
 
+/// Largest error of a short film at 320 x 240, over the path. A slow start from rest leaves
+/// translation and rotation hard to tell apart, which dominates it.
+inline constexpr double kShareOfPath = 0.02;
+
+inline Tracker slowTracker(const TrackerOptions& options = {}) {
+  return Tracker(slowFilm().camera, options);
+}
+
 using Frames = std::vector<std::shared_ptr<const TrackedFrame>>;
 
 /// Tracks frames [first, last) of a film.
