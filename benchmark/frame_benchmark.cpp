@@ -80,7 +80,6 @@ void trackFrames(benchmark::State& state, const Case& c) {
     options.matching.latch_information_bits = 0.0;
     options.matching.max_milliseconds = 0.0;
   }
-  options.matching.clock_s = threadSeconds;
   Tracker tracker(sequence.camera, options);
   Series frame_ms, match_ms, matching_ms, measure_ms, update_ms, map_ms, matched;
   double pixels = 0.0, gates = 0.0, searches = 0.0;

@@ -131,10 +131,8 @@ std::map<std::string, std::map<int, double>>& medians() {
 }
 
 void matchFrames(benchmark::State& state, const std::string& label, const std::string& matcher,
-                 int features, int width, int height, double rate, const MatchOptions& given) {
+                 int features, int width, int height, double rate, const MatchOptions& options) {
   const auto& problems = cachedProblems(features, width, height, rate);
-  MatchOptions options = given;
-  options.clock_s = threadSeconds;
   const auto instance = createMatcher(matcher);
   ImageFeatureSearch search{ImageOptions()};
   std::vector<double> milliseconds;

@@ -203,10 +203,16 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   const Eigen::LLT<Eigen::MatrixXd> factor(information);
   const int kept = cameras + 3 * F - 6 * (first_camera - 1);
   if (factor.info() != Eigen::Success) return {};
-  Eigen::MatrixXd selection = Eigen::MatrixXd::Zero(cameras + 3 * F, kept);
-  selection.bottomRows(kept).setIdentity();
-  factor.matrixL().solveInPlace(selection);
-  return selection.transpose() * selection;
+  // With L = [L1 0; L21 L2], what is kept below, its covariance is L2^-T L2^-1.
+  Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(kept, kept);
+  factor.matrixLLT()
+      .bottomRightCorner(kept, kept)
+      .triangularView<Eigen::Lower>()
+      .solveInPlace(inverse_root);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(kept, kept);
+  covariance.selfadjointView<Eigen::Lower>().rankUpdate(inverse_root.transpose());
+  covariance.triangularView<Eigen::StrictlyUpper>() = covariance.transpose();
+  return covariance;
 }
 
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle) {

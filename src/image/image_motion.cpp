@@ -8,8 +8,9 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kCoarseWidth = 40, kFineWidth = 80;  ///< of the copies [px]
-constexpr double kSmoothing = 2.0;                 ///< standard deviation [px of the copies]
+constexpr int kFineWidth = 80;         ///< of the copies [px]
+constexpr double kCoarseOfFine = 0.5;  ///< width of the coarse copies, by that of the fine
+constexpr double kSmoothing = 2.0;     ///< standard deviation [px of the copies]
 constexpr double kLeastCorrelation = 0.75;
 constexpr double kSigma = 0.75;  ///< of the result [px of the finest copies]
 /// Of what the correlation lacks to 1: of two alignments at different places one must leave less
@@ -20,19 +21,20 @@ constexpr int kMostSteps = 30;
 constexpr double kSmallGain = 1e-3;  ///< of the correlation: a step that gains less is the last
 
 cv::Mat smallCopy(const cv::Mat& image, double scale) {
-  cv::Mat small, smooth;
+  cv::Mat small, copy;
   cv::resize(image, small, cv::Size(), scale, scale, cv::INTER_AREA);
-  small.convertTo(smooth, CV_32F);
-  cv::GaussianBlur(smooth, smooth, cv::Size(), kSmoothing);
-  return smooth;
+  small.convertTo(copy, CV_32F);
+  return copy;
+}
+
+cv::Mat smooth(const cv::Mat& image) {
+  cv::Mat result;
+  cv::GaussianBlur(image, result, cv::Size(), kSmoothing);
+  return result;
 }
 
 /// Both images at one scale.
 struct Copies {
-  Copies(const cv::Mat& previous_image, const cv::Mat& image, int width)
-      : scale(static_cast<double>(width) / image.cols),
-        previous(smallCopy(previous_image, scale)),
-        now(smallCopy(image, scale)) {}
   double scale;
   cv::Mat previous, now;
 };
@@ -78,20 +80,29 @@ std::optional<ImageMotion> estimateImageMotion(const cv::Mat& previous, const cv
   if (image.empty() || image.size() != previous.size() || image.type() != CV_8UC1 ||
       previous.type() != CV_8UC1)
     return std::nullopt;
+  const double scale = static_cast<double>(kFineWidth) / image.cols, sigma_px = kSigma / scale;
+  const cv::Mat small_previous = smallCopy(previous, scale), small_now = smallCopy(image, scale);
+  const Copies fine = {scale, smooth(small_previous), smooth(small_now)};
+  const Copies coarse = {kCoarseOfFine * scale, smooth(smallCopy(small_previous, kCoarseOfFine)),
+                         smooth(smallCopy(small_now, kCoarseOfFine))};
   // Coarse to fine reaches far; from the guess the fine copies alone find what is near. Where the
   // scene repeats itself these are two places, and one is right only if it fits clearly better.
   ImageMotion far = guess, near = guess;
-  const Copies fine(previous, image, kFineWidth);
-  double of_far = 0.0;
-  if (align(Copies(previous, image, kCoarseWidth), &far) > 0.0) of_far = align(fine, &far);
   const double of_near = align(fine, &near);
+  double of_far = align(coarse, &far);
+  const auto areOnePlace = [&] {
+    return farthestApart(near, far, image.size()) <= kSamePlaceSigmas * sigma_px;
+  };
+  if (of_far > 0.0 && of_near >= kLeastCorrelation && areOnePlace()) {
+    of_far = of_near;
+    far = near;
+  } else if (of_far > 0.0) {
+    of_far = align(fine, &far);
+  }
   const bool is_near = of_near > of_far;
   if (std::max(of_near, of_far) < kLeastCorrelation) return std::nullopt;
-  const double sigma_px = kSigma / fine.scale;
   const double misfit = 1.0 - std::max(of_near, of_far), other = 1.0 - std::min(of_near, of_far);
-  if (misfit > kClearlyBetter * other &&
-      farthestApart(near, far, image.size()) > kSamePlaceSigmas * sigma_px)
-    return std::nullopt;
+  if (misfit > kClearlyBetter * other && !areOnePlace()) return std::nullopt;
   ImageMotion motion = is_near ? near : far;
   motion.sigma_px = sigma_px;
   return motion;

@@ -11,11 +11,11 @@ namespace active_matching_slam {
 namespace {
 
 /// Rows are padded to this many numbers, so that loops along them vectorise.
-constexpr int kStride = 36;
+constexpr int kStride = 40;
 constexpr int kLargestSide = Template::kMaximumSize + 2;
 static_assert(kStride >= kLargestSide, "a row holds the template and a rim");
 
-int roundedUp(int count) { return (count + 3) / 4 * 4; }
+int roundedUp(int count) { return (count + 7) / 8 * 8; }
 
 /// Interpolated side x side window of the image whose first sample lies at (u, v); false when its
 /// support leaves the image. The fractional shift is the same everywhere, so it is separable.
@@ -44,42 +44,51 @@ bool sampleWindow(const cv::Mat& image, double u, double v, int side, float* win
   return true;
 }
 
+constexpr int kSums = 13;
+
+/// The sums that make the normal equations, over the template: of grey level I, slopes I_u and I_v,
+/// 1 and t, products as named in NormalEquations. They run along columns first: a fixed order, and
+/// many at a time. Columns beyond the template run along and are left out at the end.
+__attribute__((target_clones("avx2", "default"))) void sumProducts(const float* window,
+                                                                   const float* wanted, int size,
+                                                                   float mean, double* s) {
+  const int lanes = roundedUp(size);
+  float sums[kSums][kStride] = {};
+  for (int j = 0; j < size; ++j) {
+    const float* at = window + (j + 1) * kStride + 1;
+    const float* t = wanted + j * kStride;
+    for (int i = 0; i < lanes; ++i) {
+      const float grey = at[i] - mean;
+      const float slope_u = 0.5f * (at[i + 1] - at[i - 1]);
+      const float slope_v = 0.5f * (at[i + kStride] - at[i - kStride]);
+      sums[0][i] += grey * grey;
+      sums[1][i] += grey * slope_u;
+      sums[2][i] += grey * slope_v;
+      sums[3][i] += grey;
+      sums[4][i] += slope_u * slope_u;
+      sums[5][i] += slope_u * slope_v;
+      sums[6][i] += slope_u;
+      sums[7][i] += slope_v * slope_v;
+      sums[8][i] += slope_v;
+      sums[9][i] += grey * t[i];
+      sums[10][i] += slope_u * t[i];
+      sums[11][i] += slope_v * t[i];
+      sums[12][i] += t[i];
+    }
+  }
+  for (int k = 0; k < kSums; ++k) {
+    s[k] = 0.0;
+    for (int i = 0; i < size; ++i) s[k] += sums[k][i];
+  }
+}
+
 /// Normal equations of t ~ x0 I + x1 I_u + x2 I_v + x3 over the template. Grey levels are given
-/// less `mean`. Sums run along columns first: a fixed order, and four at a time.
+/// less `mean`.
 class NormalEquations {
  public:
   NormalEquations(const float* window, const float* wanted, int size, float mean) {
-    const int lanes = roundedUp(size);
-    float sums[kSums][kStride] = {};
-    for (int j = 0; j < size; ++j) {
-      const float* at = window + (j + 1) * kStride + 1;
-      // Beyond the template all stay zero: the row adds nothing there.
-      float grey[kStride] = {}, slope_u[kStride] = {}, slope_v[kStride] = {};
-      for (int i = 0; i < size; ++i) {
-        grey[i] = at[i] - mean;
-        slope_u[i] = 0.5f * (at[i + 1] - at[i - 1]);
-        slope_v[i] = 0.5f * (at[i + kStride] - at[i - kStride]);
-      }
-      const float* t = wanted + j * kStride;
-      for (int i = 0; i < lanes; ++i) {
-        sums[0][i] += grey[i] * grey[i];
-        sums[1][i] += grey[i] * slope_u[i];
-        sums[2][i] += grey[i] * slope_v[i];
-        sums[3][i] += grey[i];
-        sums[4][i] += slope_u[i] * slope_u[i];
-        sums[5][i] += slope_u[i] * slope_v[i];
-        sums[6][i] += slope_u[i];
-        sums[7][i] += slope_v[i] * slope_v[i];
-        sums[8][i] += slope_v[i];
-        sums[9][i] += grey[i] * t[i];
-        sums[10][i] += slope_u[i] * t[i];
-        sums[11][i] += slope_v[i] * t[i];
-        sums[12][i] += t[i];
-      }
-    }
-    std::array<double, kSums> s{};
-    for (int k = 0; k < kSums; ++k)
-      for (int i = 0; i < lanes; ++i) s[k] += sums[k][i];
+    double s[kSums];
+    sumProducts(window, wanted, size, mean, s);
     left_ << s[0], s[1], s[2], s[3], s[1], s[4], s[5], s[6], s[2], s[5], s[7], s[8], s[3], s[6],
         s[8], size * size;
     right_ << s[9], s[10], s[11], s[12];
@@ -94,7 +103,6 @@ class NormalEquations {
   }
 
  private:
-  static constexpr int kSums = 13;
   Eigen::Matrix4d left_;
   Eigen::Vector4d right_;
 };
@@ -136,7 +144,7 @@ std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Templa
   // image explains the template and not the other way round: then the residual is the template's
   // own energy times 1 - ZNCC^2, and the least is where the ZNCC is highest, blurred image or not.
   Eigen::Vector2d pixel = start;
-  std::array<float, kLargestSide * kStride> window;
+  std::array<float, kLargestSide * kStride> window{};
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     if (!sampleWindow(image, pixel.x() - side / 2, pixel.y() - side / 2, side, window.data()))
       return std::nullopt;
