@@ -32,6 +32,29 @@ std::optional<double> normalisedErrorSquared(const Eigen::VectorXd& error,
   return result;
 }
 
+std::optional<double> likeliestUnit(const std::vector<Eigen::Isometry3d>& estimates,
+                                    const std::vector<Eigen::Isometry3d>& truth,
+                                    const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
+  // The error is d + u t, where d is that to a truth at the origin and t the true translation.
+  double information = 0.0, weighted = 0.0;
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    Eigen::Isometry3d at_origin = truth[i];
+    at_origin.translation().setZero();
+    const Eigen::Matrix<double, 6, 1> d = poseError(estimates[i], at_origin);
+    Eigen::Matrix<double, 6, 1> t = Eigen::Matrix<double, 6, 1>::Zero();
+    t.head<3>() = truth[i].translation();
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> cholesky(covariances[i]);
+    if (cholesky.info() != Eigen::Success) continue;
+    const Eigen::Matrix<double, 6, 1> Wt = cholesky.solve(t);
+    if (!Wt.allFinite() || !d.allFinite()) continue;
+    information += t.dot(Wt);
+    weighted -= d.dot(Wt);
+  }
+  const double unit = weighted / information;
+  if (!(information > 0.0) || !(unit > 0.0)) return std::nullopt;
+  return unit;
+}
+
 ChiSquareBounds chiSquareMeanBounds(int degrees, int runs, double confidence) {
   if (degrees < 1 || runs < 1)
     throw std::invalid_argument("chi-square bounds: degrees is " + std::to_string(degrees) +

@@ -40,20 +40,25 @@ std::vector<PosePair> posesOf(const std::vector<std::pair<int, int>>& indices,
   return pairs;
 }
 
-/// Brings the truth into the world of the map, in which the filter's covariance is stated. A metric
-/// map shares the truth's world. A free one has its origin in its first camera, known without
-/// error, and its unit of length is a convention: the one that fits the run best.
-std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, bool metric) {
+/// `pairs` in the world of the map, in which the filter's covariance is stated. A metric map shares
+/// the truth's world. A free one begins at its first camera, known without error, and its unit of
+/// length is a convention: the likeliest one.
+std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, bool metric,
+                                 const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
   if (metric || pairs.empty()) return pairs;
-  const std::optional<Alignment> similarity = align(pairs, AlignmentKind::kSimilarity);
-  const double unit = similarity ? similarity->scale : 1.0;
-  const Eigen::Isometry3d T_map_camera0 = pairs.front().T_world_camera_estimate;
-  const Eigen::Isometry3d T_truth_camera0 = pairs.front().T_world_camera_truth;
+  const Eigen::Isometry3d T_map_truth =
+      pairs.front().T_world_camera_estimate * pairs.front().T_world_camera_truth.inverse();
+  const Eigen::Vector3d begin = pairs.front().T_world_camera_estimate.translation();
+  std::vector<Eigen::Isometry3d> estimates, truth;
   for (PosePair& pair : pairs) {
-    Eigen::Isometry3d T_camera0_camera = T_truth_camera0.inverse() * pair.T_world_camera_truth;
-    T_camera0_camera.translation() /= unit;
-    pair.T_world_camera_truth = T_map_camera0 * T_camera0_camera;
+    pair.T_world_camera_truth = T_map_truth * pair.T_world_camera_truth;
+    pair.T_world_camera_truth.pretranslate(-begin);
+    pair.T_world_camera_estimate.pretranslate(-begin);
+    estimates.push_back(pair.T_world_camera_estimate);
+    truth.push_back(pair.T_world_camera_truth);
   }
+  const double unit = likeliestUnit(estimates, truth, covariances).value_or(1.0);
+  for (PosePair& pair : pairs) pair.T_world_camera_truth.translation() *= unit;
   return pairs;
 }
 
@@ -155,12 +160,13 @@ FrameErrors frameErrors(const std::vector<FrameRecord>& records, const RunTruth&
       errors.position_m[indices[i].first] = absoluteTrajectoryError({pairs[i]}, *alignment);
   }
   if (!truth.simulated) return errors;
-  const std::vector<PosePair> in_map = inMapWorld(pairs, metric);
+  std::vector<Eigen::Matrix<double, 6, 6>> covariances;
+  for (const auto& [r, t] : indices) covariances.push_back(records[r].pose_covariance);
+  const std::vector<PosePair> in_map = inMapWorld(pairs, metric, covariances);
   for (std::size_t i = 0; i < in_map.size(); ++i) {
-    const FrameRecord& record = records[indices[i].first];
     const auto nees = normalisedErrorSquared(
         poseError(in_map[i].T_world_camera_estimate, in_map[i].T_world_camera_truth),
-        record.pose_covariance);
+        covariances[i]);
     if (nees) errors.pose_nees[indices[i].first] = *nees;
   }
   return errors;

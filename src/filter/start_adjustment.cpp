@@ -17,6 +17,8 @@ constexpr double kFirstParallaxPx = 0.5, kParallaxGrowth = 2.0, kLastParallaxPx 
 /// apart: in a scene that goes from near to far it would rather bend the motion than let depths
 /// differ.
 constexpr double kDepthFreedom = 10.0;
+/// Prior of depths in the end, by how far apart they turned out to be (median).
+constexpr double kDepthSpread = 2.0;
 constexpr double kGrowthInDoubt = 1.25;    ///< the factor when the images leave a doubt
 constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
 constexpr std::size_t kMostImages = 24;    ///< kept
@@ -136,6 +138,14 @@ void normalise(double inverse_depth, Bundle* bundle) {
   std::vector<double> values;
   for (const FeatureState& feature : bundle->features) values.push_back(feature.inverse_depth);
   if (!values.empty()) rescale(medianOf(std::move(values)) / inverse_depth, bundle);
+}
+
+/// Median distance of the inverse depths to one.
+double medianDeviation(const Bundle& bundle, double inverse_depth) {
+  std::vector<double> deviations;
+  for (const FeatureState& feature : bundle.features)
+    deviations.push_back(std::abs(feature.inverse_depth - inverse_depth));
+  return medianOf(std::move(deviations));
 }
 
 /// Scales the bundle to the unit of length of `before`: the median of the inverse depths stays.
@@ -314,6 +324,9 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   if (parallax) next_parallax_px_ = (in_doubt ? kGrowthInDoubt : kParallaxGrowth) * *parallax;
   if (in_doubt) return std::nullopt;
 
+  options.sigma_inverse_depth =
+      std::max(options.sigma_inverse_depth,
+               kDepthSpread * medianDeviation(readings[best], options.inverse_depth));
   Bundle reading = allImages(readings[best], rest);
   adjustBundle(model, options, &reading);
   // Corners where something near hides something far wander by less than would make them outliers;

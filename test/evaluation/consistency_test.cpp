@@ -60,6 +60,52 @@ TEST(ChiSquareMeanBounds, RefuseWhatHasNoMeaning) {
   EXPECT_THROW(chiSquareMeanBounds(6, 1, NAN), std::invalid_argument);
 }
 
+TEST(LikeliestUnit, MakesTheSumOfNormalisedErrorsLeast) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  const auto drawn = [&] {
+    return Eigen::Vector3d(normal(random), normal(random), normal(random));
+  };
+  std::vector<Eigen::Isometry3d> estimates, truth;
+  std::vector<Eigen::Matrix<double, 6, 6>> covariances;
+  for (int i = 0; i < 20; ++i) {
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.translation() = drawn();
+    T.linear() = Eigen::AngleAxisd(0.3 * i, drawn().normalized()).toRotationMatrix();
+    truth.push_back(T);
+    T.translation() = 0.4 * T.translation() + 0.02 * drawn();
+    T.linear() = Eigen::AngleAxisd(0.02, drawn().normalized()) * T.linear();
+    estimates.push_back(T);
+    Eigen::Matrix<double, 6, 6> root;
+    for (int k = 0; k < 36; ++k) root(k) = normal(random);
+    covariances.push_back(root * root.transpose());
+  }
+  const auto cost = [&](double unit) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      Eigen::Isometry3d scaled = truth[i];
+      scaled.translation() *= unit;
+      sum += *normalisedErrorSquared(poseError(estimates[i], scaled), covariances[i]);
+    }
+    return sum;
+  };
+  const auto unit = likeliestUnit(estimates, truth, covariances);
+  ASSERT_TRUE(unit);
+  EXPECT_NEAR(*unit, 0.4, 0.05);
+  EXPECT_LT(cost(*unit), cost(*unit + 1e-4));
+  EXPECT_LT(cost(*unit), cost(*unit - 1e-4));
+}
+
+TEST(LikeliestUnit, IsUnknownWithoutMotionOrCovariance) {
+  const std::vector<Eigen::Isometry3d> still(2, Eigen::Isometry3d::Identity());
+  using Covariances = std::vector<Eigen::Matrix<double, 6, 6>>;
+  EXPECT_FALSE(likeliestUnit({}, {}, {}));
+  EXPECT_FALSE(likeliestUnit(still, still, Covariances(2, Covariances::value_type::Identity())));
+  std::vector<Eigen::Isometry3d> moved = still;
+  moved[1].translation().x() = 1.0;
+  EXPECT_FALSE(likeliestUnit(moved, moved, Covariances(2, Covariances::value_type::Zero())));
+}
+
 class MonteCarlo : public testing::Test {
  protected:
   /// Mean NEES over 30 runs of 400 steps, the covariance stated being `claimed` times the true one.

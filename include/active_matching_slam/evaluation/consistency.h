@@ -18,6 +18,14 @@ Eigen::Matrix<double, 6, 1> poseError(const Eigen::Isometry3d& T_world_camera_es
 std::optional<double> normalisedErrorSquared(const Eigen::VectorXd& error,
                                              const Eigen::MatrixXd& covariance);
 
+/// Where the unit of length is a convention (a map of free scale): the factor for the translations
+/// of `truth`, by which the sum of the normalised errors squared of `estimates` is least. Arguments
+/// have equal sizes; all poses are from one world, the map's. Empty without a proper covariance or
+/// when the truth never leaves the origin.
+std::optional<double> likeliestUnit(const std::vector<Eigen::Isometry3d>& estimates,
+                                    const std::vector<Eigen::Isometry3d>& truth,
+                                    const std::vector<Eigen::Matrix<double, 6, 6>>& covariances);
+
 /// Two-sided bounds.
 struct ChiSquareBounds {
   double lower = 0.0;
