@@ -29,15 +29,12 @@ Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& led
   root.share.assign(size, 1.0);
   root.lineage.assign(size, -1);
   root.candidate_of.assign(size, -1);
-  root.entry.assign(size, PairTable::kNone);
-  pairs_.resize(size);
-  fused_entries_.resize(size);
   for (int f = 0; f < joint.size(); ++f) {
     valid_.push_back(ledger.validArea(f));
     root.mean[slot(f)] = prior.mean(f);
-    root.entry[slot(f)] = pairs_[slot(f)].acquire();
     addCandidate(root, f);
   }
+  beginTerms(root);
   hypotheses_.push_back(std::move(root));
 }
 
@@ -117,6 +114,16 @@ const PairTerm& Mixture::ownTerm(int g, int c) {
   own.mass = candidate.mass;
   complete(own, candidate, 0.0);
   return own;
+}
+
+/// Remembers terms from now on; `h` is alone.
+void Mixture::beginTerms(Hypothesis& h) {
+  const std::size_t size = h.mean.size();
+  keeps_terms_ = true;
+  pairs_.assign(size, {});
+  fused_entries_.assign(size, {});
+  h.entry.clear();
+  for (PairTable& pairs : pairs_) h.entry.push_back(pairs.acquire());
 }
 
 void Mixture::forgetTerms() {

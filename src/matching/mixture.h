@@ -204,6 +204,7 @@ class Mixture {
   void updateThesis(int g, int c, MatchStep& step, std::vector<Child>& children);
   void reweigh(int g, int f, std::vector<Child>& children, MatchStep& step);
   void mergeSiblings(int g, int f, std::vector<Child>& children) const;
+  void beginTerms(Hypothesis& h);
   Hypothesis spawn(const Hypothesis& parent, int f, const Child& child);
   /// Entries of a newborn in the tables of pairs; its parent's where `is_changed` is 0.
   void takeEntries(Hypothesis& child, const Hypothesis& parent, int f,

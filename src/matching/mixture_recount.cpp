@@ -210,7 +210,6 @@ bool Mixture::beginRunnerUp() {
   const int first = heaviest();
   for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
     Hypothesis& h = hypotheses_[slot(k)];
-    releaseEntries(h);
     if (k != first) (h.hasOpenCandidate() ? aside_ : ended_).push_back(std::move(h));
   }
   Hypothesis done = std::move(hypotheses_[slot(first)]);
@@ -224,7 +223,7 @@ bool Mixture::beginRunnerUp() {
   }
   hypotheses_.push_back(std::move(*next));
   Hypothesis& begun = hypotheses_.front();
-  begun.entry.assign(begun.entry.size(), PairTable::kNone);
+  beginTerms(begun);
   begun.weight = 1.0;
   begun.log_weight = 0.0;
   aside_.erase(next);
