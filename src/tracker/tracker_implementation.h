@@ -50,10 +50,12 @@ class Tracker::Implementation {
   void follow(const cv::Mat& image, TrackedFrame* frame);
   void predict(double interval_s);
   void measure(const cv::Mat& image);
-  bool askToo(Matcher& matcher, const MeasurementPrior& prior, double share, double least,
-              double chi2_per_degree, const cv::Mat& image, TrackedFrame* frame);
+  bool askToo(Matcher& matcher, const MeasurementPrior& prior, ImageFeatureSearch& search,
+              double share, double least, double chi2_per_degree, TrackedFrame* frame);
   std::optional<MeasurementPrior> guidedPrior(const cv::Mat& image) const;
   MatchOptions partOfBudget(double share) const;
+  double budgetLeft(const MatchStatistics& done) const;
+  double expectedOf(const MatchStatistics& s) const;
   void match(const cv::Mat& image, TrackedFrame* frame);
   void correct(TrackedFrame* frame);
   void judge();

@@ -20,9 +20,8 @@ constexpr double kLeastShare = 0.1;        ///< of the matches expected: fewer a
 constexpr int kFewPoorFrames = 2;          ///< after more, no second opinion
 constexpr double kMajority = 0.5;          ///< of the matches expected, for JCBB's to count
 constexpr double kClearlyMore = 1.25;      ///< matches, for RANSAC's to count
-/// Of the budget: the first attempt, the same under the image's own motion, and each opinion.
-constexpr double kFirstShare = 0.6, kGuidedShare = 0.2, kOpinionShare = 0.1;
-constexpr double kAgreementChi2 = 13.8;  ///< 99.9 % of 2 degrees of freedom
+constexpr double kFirstShare = 0.6;        ///< of the budget, for the first attempt
+constexpr double kAgreementChi2 = 13.8;    ///< 99.9 % of 2 degrees of freedom
 /// Pixels in all ellipses together beyond which the image's motion guides the first attempt.
 constexpr double kWideGatesPx = 2e5;
 
@@ -80,25 +79,24 @@ void Tracker::Implementation::measure(const cv::Mat& image) {
   search_.beginFrame(image, templates_);
 }
 
-/// Asks again, under a prior of its own and within a share of the frame's budget; a consensus of at
-/// least so many counts, if its joint squared distance (0 where the matcher has none) is at most
-/// `chi2_per_degree`.
-bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& prior, double share,
-                                     double least, double chi2_per_degree, const cv::Mat& image,
-                                     TrackedFrame* frame) {
-  second_search_.beginFrame(image, templates_);
-  MatchResult second = matcher.match(prior, second_search_, partOfBudget(share));
-  MatchStatistics& first = frame->matching.statistics;
-  const double both_ms = second.statistics.total_ms + first.total_ms;
+/// Asks again, under a prior of its own, in a new search or going on in that of the first attempt,
+/// with a share of what is left of the frame's budget; a consensus of at least so many counts, if
+/// its joint squared distance (0 where the matcher has none) is at most `chi2_per_degree`.
+bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& prior,
+                                     ImageFeatureSearch& search, double share, double least,
+                                     double chi2_per_degree, TrackedFrame* frame) {
+  const MatchStatistics first = frame->matching.statistics;
+  const double left = budgetLeft(first);
+  if (!(left > 0.0)) return false;
+  MatchResult second = matcher.match(prior, search, partOfBudget(share * left));
   const bool is_better =
       second.statistics.matched >= least &&
       second.statistics.mahalanobis2 <= 2.0 * second.statistics.matched * chi2_per_degree;
-  if (is_better) {
-    second.statistics.pixels_searched += first.pixels_searched;
-    frame->matching = std::move(second);
-    std::swap(search_, second_search_);  // match indices belong to the search that found them
-  }
-  frame->matching.statistics.total_ms = both_ms;
+  const std::int64_t pixels = first.pixels_searched + second.statistics.pixels_searched;
+  if (is_better) frame->matching = std::move(second);
+  MatchStatistics& all = frame->matching.statistics;
+  all.pixels_searched = pixels;
+  all.total_ms = first.total_ms + second.statistics.total_ms;
   return is_better;
 }
 
@@ -119,6 +117,19 @@ std::optional<MeasurementPrior> Tracker::Implementation::guidedPrior(const cv::M
   return conditionOnImageMotion(prior_, before_px, *motion);
 }
 
+/// Matches that a result should have. One that was cut short need not answer for the features that
+/// its budget did not suffice for, unless those searched had several matches each: then it has
+/// chosen without having heard the others.
+double Tracker::Implementation::expectedOf(const MatchStatistics& s) const {
+  constexpr double kSeveral = 1.5;
+  if (!s.cut_short) return map_.expectedMatches(candidates_);
+  std::vector<VisibleFeature> searched;
+  for (std::size_t i = 0; i < candidates_.size(); ++i)
+    if (search_.searchedPixels(static_cast<int>(i)).size() > 0) searched.push_back(candidates_[i]);
+  const bool is_crowded = s.matches_met > kSeveral * static_cast<double>(searched.size());
+  return map_.expectedMatches(is_crowded ? candidates_ : searched);
+}
+
 /// A slower camera, or a gap, leaves more time: the budget is meant for 30 Hz.
 MatchOptions Tracker::Implementation::partOfBudget(double share) const {
   MatchOptions options = options_.matching;
@@ -128,6 +139,17 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
     options.max_pixels =
         std::max<std::int64_t>(1, std::llround(share * static_cast<double>(options.max_pixels)));
   return options;
+}
+
+/// Share of the frame's budget that what was done has not used up; 1 without a budget.
+double Tracker::Implementation::budgetLeft(const MatchStatistics& done) const {
+  const MatchOptions whole = partOfBudget(1.0);
+  double left = 1.0;
+  if (whole.max_milliseconds > 0.0) left = 1.0 - done.total_ms / whole.max_milliseconds;
+  if (whole.max_pixels > 0)
+    left = std::min(left, 1.0 - static_cast<double>(done.pixels_searched) /
+                                    static_cast<double>(whole.max_pixels));
+  return left;
 }
 
 /// Asks the matcher, and again when far fewer features matched than should have:
@@ -152,29 +174,31 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   if (expected < 8.0) return;
   const auto isPoor = [&] {
     const MatchStatistics& s = frame->matching.statistics;
-    return s.matched <= (s.ambiguous ? kPoorShareWhenAmbiguous : kPoorShare) * expected;
+    return s.matched <= (s.ambiguous ? kPoorShareWhenAmbiguous : kPoorShare) * expectedOf(s);
   };
   const auto clearlyMore = [&] {
     return std::max(kClearlyMore * frame->matching.statistics.matched, kMajority * expected);
   };
   if (isPoor()) {
     if (!was_guided) guided = guidedPrior(image);
-    if (guided)
-      askToo(*matcher_, was_guided ? prior_ : *guided, kGuidedShare, clearlyMore(), 0.0, image,
-             frame);
+    second_search_.beginFrame(image, templates_);
+    if (guided && askToo(*matcher_, was_guided ? prior_ : *guided, second_search_, 0.5,
+                         clearlyMore(), 0.0, frame))
+      std::swap(search_, second_search_);  // match indices belong to the search that found them
   }
   // After some poor frames the ellipses are so wide that chance alone makes a consensus.
   if (poor_frames_ <= kFewPoorFrames) {
+    // Both look where the ellipses are, so what has been searched there need not be again.
     bool is_settled = false;
     const int matched = frame->matching.statistics.matched;
     if (isPoor())
       is_settled =
-          askToo(*longest_matcher_, prior_, kOpinionShare,
-                 std::max(1.0 * matched, kMajority * expected), kCloseChi2PerDegree, image, frame);
+          askToo(*longest_matcher_, prior_, search_, 0.5,
+                 std::max(1.0 * matched, kMajority * expected), kCloseChi2PerDegree, frame);
     if (!is_settled && frame->matching.statistics.matched <= kPoorShare * expected)
-      askToo(*consensus_matcher_, prior_, kOpinionShare,
+      askToo(*consensus_matcher_, prior_, search_, 1.0,
              std::max(kClearlyMore * frame->matching.statistics.matched, kLeastShare * expected),
-             kFarChi2PerDegree, image, frame);
+             kFarChi2PerDegree, frame);
   }
   MatchResult& result = frame->matching;
   if (result.statistics.matched >= kLeastShare * expected) return;

@@ -12,7 +12,7 @@ namespace active_matching_slam {
 namespace {
 
 struct TrackedRun {
-  int frames = 0;
+  int frames = 0, cut_short = 0;
   Trajectory tracked;
   std::int64_t pixels = 0, pixels_full_gates = 0;
 };
@@ -30,6 +30,7 @@ TrackedRun trackAll(const std::string& name, int every, TrackerOptions options, 
     ++run.frames;
     if (frame->state == TrackingState::kTracking)
       run.tracked.push_back({stamp_s, frame->camera.poseWorldCamera()});
+    run.cut_short += frame->matching.statistics.cut_short;
     run.pixels += frame->matching.statistics.pixels_searched;
     run.pixels_full_gates += frame->matching.statistics.pixels_full_gates;
     return true;
@@ -85,10 +86,28 @@ TEST_F(RecordedSequences, CheckerboardIsTrackedThroughRepeatedTexture) {
   EXPECT_LE(errorMm(run, "uzh_vamr_checkerboard", AlignmentKind::kSimilarity), 4.0);
 }
 
+// Settings that should hardly matter, as a feature more or less, move its error from 65 to 95 mm.
+constexpr double kKitchenMm = 100.0;
+
 TEST_F(RecordedSequences, KitchenIsTracked) {
   const TrackedRun run = trackAll("sevenscenes_redkitchen", 1, {}, false);
   EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
-  EXPECT_LE(errorMm(run, "sevenscenes_redkitchen", AlignmentKind::kSimilarity), 80.0);
+  EXPECT_LE(errorMm(run, "sevenscenes_redkitchen", AlignmentKind::kSimilarity), kKitchenMm);
+}
+
+TEST_F(RecordedSequences, KitchenIsTrackedWithinTheBudgetOfASlowMachine) {
+  // A clock that ticks whenever it is read: time for some 100 to 200 searches of the 60 features,
+  // where ambiguous frames ask for 800. Half of the frames are cut short.
+  for (const double tick_s : {20e-6, 30e-6}) {
+    TrackerOptions options;
+    options.matching.max_milliseconds = 20.0;
+    options.matching.clock_s = [now_s = 0.0, tick_s]() mutable { return now_s += tick_s; };
+    const TrackedRun run = trackAll("sevenscenes_redkitchen", 1, options, false);
+    EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames) << tick_s;
+    EXPECT_GE(run.cut_short, run.frames / 5) << tick_s;
+    EXPECT_LE(errorMm(run, "sevenscenes_redkitchen", AlignmentKind::kSimilarity), kKitchenMm)
+        << tick_s;
+  }
 }
 
 TEST_F(RecordedSequences, DeskTranslationEndsWhereItBegan) {
