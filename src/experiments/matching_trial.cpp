@@ -6,6 +6,7 @@
 
 #include "active_matching_slam/experiments/experiment.h"
 #include "active_matching_slam/image/image_feature_search.h"
+#include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "active_matching_slam/tracker/tracker_options.h"
 
@@ -61,7 +62,7 @@ RecordedProblem selectFeatures(const RecordedProblem& problem, const std::vector
   part.other_ms = problem.other_ms;
   part.prior.noise_variance_px2 = problem.prior.noise_variance_px2;
   part.prior.z.resize(2 * count);
-  part.prior.S.resize(2 * count, 2 * count);
+  part.prior.S = selectFeatures(problem.prior.S, kept);
   for (int i = 0; i < count; ++i) {
     const int from = kept[static_cast<std::size_t>(i)];
     const auto slot = static_cast<std::size_t>(from);
@@ -69,9 +70,6 @@ RecordedProblem selectFeatures(const RecordedProblem& problem, const std::vector
     part.templates.push_back(problem.templates[slot]);
     part.reference_px.push_back(problem.reference_px[slot]);
     part.prior.z.segment<2>(2 * i) = problem.prior.mean(from);
-    for (int k = 0; k < count; ++k)
-      part.prior.S.block<2, 2>(2 * i, 2 * k) =
-          problem.prior.S.block<2, 2>(2 * from, 2 * kept[static_cast<std::size_t>(k)]);
   }
   return part;
 }

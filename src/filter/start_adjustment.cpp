@@ -302,7 +302,7 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   flatten(model, options.inverse_depth, &readings[1]);
   std::vector<double> costs;
   BundleOptions telling = options;
-  telling.sigma_inverse_depth = kDepthFreedom * filter.options().initial_sigma_inverse_depth;
+  telling.sigma_inverse_depth *= kDepthFreedom;
   for (std::size_t i = 0; i < 4; ++i) {
     if (i >= 2) {
       if (i == 3 && isSameReading(readings[0], readings[1])) break;

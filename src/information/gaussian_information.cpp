@@ -91,18 +91,6 @@ std::vector<int> usableFeatures(const MatrixRef& S) {
   return kept;
 }
 
-MatrixXd selectFeatures(const MatrixRef& S, const std::vector<int>& features) {
-  const Eigen::Index n = static_cast<Eigen::Index>(features.size());
-  if (2 * n == S.rows()) return S;
-  MatrixXd selected(2 * n, 2 * n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    for (Eigen::Index i = 0; i < n; ++i) {
-      selected.block<2, 2>(2 * i, 2 * k) = S.block<2, 2>(2 * features[i], 2 * features[k]);
-    }
-  }
-  return selected;
-}
-
 /// Factors `S`, growing its diagonal by as little as makes that possible.
 std::optional<MatrixXd> regularisedFactor(MatrixXd& S, double& regularisation) {
   std::optional<MatrixXd> factor = choleskyFactor(S);
@@ -120,6 +108,18 @@ std::optional<MatrixXd> regularisedFactor(MatrixXd& S, double& regularisation) {
 double determinant2(const Eigen::Matrix2d& m) { return m(0, 0) * m(1, 1) - m(1, 0) * m(1, 0); }
 
 }  // namespace
+
+MatrixXd selectFeatures(const MatrixRef& S, const std::vector<int>& features) {
+  const Eigen::Index n = static_cast<Eigen::Index>(features.size());
+  if (2 * n == S.rows()) return S;
+  MatrixXd selected(2 * n, 2 * n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      selected.block<2, 2>(2 * i, 2 * k) = S.block<2, 2>(2 * features[i], 2 * features[k]);
+    }
+  }
+  return selected;
+}
 
 std::optional<double> entropyBits(const MatrixRef& covariance) {
   checkSquare(covariance, "covariance");

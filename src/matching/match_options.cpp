@@ -1,5 +1,6 @@
 #include "active_matching_slam/matching/match_options.h"
 
+#include <algorithm>
 #include <sstream>
 #include <stdexcept>
 
@@ -16,6 +17,15 @@ void require(bool ok, const char* name, double value, const char* range) {
 bool isProbability(double p) { return p > 0.0 && p < 1.0; }
 
 }  // namespace
+
+double shareOfBudget(const MatchOptions& options, std::int64_t pixels, double milliseconds) {
+  double share = 0.0;
+  if (options.max_pixels > 0)
+    share = static_cast<double>(pixels) / static_cast<double>(options.max_pixels);
+  if (options.max_milliseconds > 0.0)
+    share = std::max(share, milliseconds / options.max_milliseconds);
+  return share;
+}
 
 void checkMatchOptions(const MatchOptions& o) {
   require(isProbability(o.default_rates.true_positive), "default_rates.true_positive",

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <random>
 
+#include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "baseline_matchers.h"
 #include "gate_search.h"
@@ -32,7 +33,7 @@ struct Stacked {
 Stacked stack(const ProperPrior& prior, const std::vector<int>& features,
               const std::vector<Eigen::Vector2d>& pixels) {
   const int n = static_cast<int>(features.size());
-  Stacked stacked{Eigen::VectorXd(2 * n), jointCovariance(prior.S(), features)};
+  Stacked stacked{Eigen::VectorXd(2 * n), selectFeatures(prior.S(), features)};
   for (int a = 0; a < n; ++a) {
     const auto slot = static_cast<std::size_t>(a);
     stacked.innovation.segment<2>(2 * a) = pixels[slot] - prior.mean(features[slot]);

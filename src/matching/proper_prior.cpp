@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/search_ellipse.h"
 
 namespace active_matching_slam {
@@ -69,13 +70,9 @@ void ProperPrior::take(const std::vector<int>& kept) {
   for (const int f : kept) original.push_back(this->original(f));
   original_ = original;
   own_z_.resize(2 * size());
-  own_S_.resize(2 * size(), 2 * size());
-  for (int i = 0; i < size(); ++i) {
+  own_S_ = selectFeatures(prior_.S, original_);
+  for (int i = 0; i < size(); ++i)
     own_z_.segment<2>(2 * i) = prior_.z.segment<2>(2 * this->original(i));
-    for (int j = 0; j < size(); ++j)
-      own_S_.block<2, 2>(2 * i, 2 * j) =
-          prior_.S.block<2, 2>(2 * this->original(i), 2 * this->original(j));
-  }
   z_ = &own_z_;
   S_ = &own_S_;
 }

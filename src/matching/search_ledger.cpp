@@ -32,12 +32,9 @@ SearchOutcome SearchLedger::search(int feature, const SearchEllipse& ellipse) {
 }
 
 double SearchLedger::budgetUsed() const {
-  double used = 0.0;
-  if (options_.max_pixels > 0)
-    used = static_cast<double>(pixels_) / static_cast<double>(options_.max_pixels);
-  if (options_.max_milliseconds > 0.0)
-    used = std::max(used, elapsedMilliseconds() / options_.max_milliseconds);
-  return used;
+  // The clock is read only if it counts.
+  return shareOfBudget(options_, pixels_,
+                       options_.max_milliseconds > 0.0 ? elapsedMilliseconds() : 0.0);
 }
 
 MatchResult SearchLedger::begin(const char* matcher) const {

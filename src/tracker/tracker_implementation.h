@@ -54,7 +54,6 @@ class Tracker::Implementation {
               double share, double least, double chi2_per_degree, TrackedFrame* frame);
   std::optional<MeasurementPrior> guidedPrior(const cv::Mat& image) const;
   MatchOptions partOfBudget(double share) const;
-  double budgetLeft(const MatchStatistics& done) const;
   double expectedOf(const MatchStatistics& s) const;
   void match(const cv::Mat& image, TrackedFrame* frame);
   void correct(TrackedFrame* frame);

@@ -3,6 +3,7 @@
 
 #include "active_matching_slam/image/image_motion.h"
 #include "active_matching_slam/image/warp.h"
+#include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/tracker/image_motion_prior.h"
 #include "active_matching_slam/tracker/innovation_check.h"
 #include "tracker_implementation.h"
@@ -21,6 +22,7 @@ constexpr int kFewPoorFrames = 2;          ///< after more, no second opinion
 constexpr double kMajority = 0.5;          ///< of the matches expected, for JCBB's to count
 constexpr double kClearlyMore = 1.25;      ///< matches, for RANSAC's to count
 constexpr double kFirstShare = 0.6;        ///< of the budget, for the first attempt
+constexpr double kShareOfRest = 0.5;       ///< for each opinion but the last, which has it all
 constexpr double kAgreementChi2 = 13.8;    ///< 99.9 % of 2 degrees of freedom
 /// Pixels in all ellipses together beyond which the image's motion guides the first attempt.
 constexpr double kWideGatesPx = 2e5;
@@ -85,18 +87,22 @@ void Tracker::Implementation::measure(const cv::Mat& image) {
 bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& prior,
                                      ImageFeatureSearch& search, double share, double least,
                                      double chi2_per_degree, TrackedFrame* frame) {
-  const MatchStatistics first = frame->matching.statistics;
-  const double left = budgetLeft(first);
+  const std::int64_t pixels_before = frame->matching.statistics.pixels_searched;
+  const double ms_before = frame->matching.statistics.total_ms;
+  const double left = 1.0 - shareOfBudget(partOfBudget(1.0), pixels_before, ms_before);
   if (!(left > 0.0)) return false;
   MatchResult second = matcher.match(prior, search, partOfBudget(share * left));
+  second.statistics.pixels_searched += pixels_before;
+  second.statistics.total_ms += ms_before;
   const bool is_better =
       second.statistics.matched >= least &&
       second.statistics.mahalanobis2 <= 2.0 * second.statistics.matched * chi2_per_degree;
-  const std::int64_t pixels = first.pixels_searched + second.statistics.pixels_searched;
-  if (is_better) frame->matching = std::move(second);
-  MatchStatistics& all = frame->matching.statistics;
-  all.pixels_searched = pixels;
-  all.total_ms = first.total_ms + second.statistics.total_ms;
+  if (is_better) {
+    frame->matching = std::move(second);
+  } else {
+    frame->matching.statistics.pixels_searched = second.statistics.pixels_searched;
+    frame->matching.statistics.total_ms = second.statistics.total_ms;
+  }
   return is_better;
 }
 
@@ -141,17 +147,6 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
   return options;
 }
 
-/// Share of the frame's budget that what was done has not used up; 1 without a budget.
-double Tracker::Implementation::budgetLeft(const MatchStatistics& done) const {
-  const MatchOptions whole = partOfBudget(1.0);
-  double left = 1.0;
-  if (whole.max_milliseconds > 0.0) left = 1.0 - done.total_ms / whole.max_milliseconds;
-  if (whole.max_pixels > 0)
-    left = std::min(left, 1.0 - static_cast<double>(done.pixels_searched) /
-                                    static_cast<double>(whole.max_pixels));
-  return left;
-}
-
 /// Asks the matcher, and again when far fewer features matched than should have:
 /// - The same matcher under the motion of the image as a whole, for a camera that was jerked. Where
 ///   the ellipses are wide from the start, that comes first, and the filter's own prior second.
@@ -176,15 +171,15 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     const MatchStatistics& s = frame->matching.statistics;
     return s.matched <= (s.ambiguous ? kPoorShareWhenAmbiguous : kPoorShare) * expectedOf(s);
   };
-  const auto clearlyMore = [&] {
-    return std::max(kClearlyMore * frame->matching.statistics.matched, kMajority * expected);
-  };
   if (isPoor()) {
     if (!was_guided) guided = guidedPrior(image);
-    second_search_.beginFrame(image, templates_);
-    if (guided && askToo(*matcher_, was_guided ? prior_ : *guided, second_search_, 0.5,
-                         clearlyMore(), 0.0, frame))
-      std::swap(search_, second_search_);  // match indices belong to the search that found them
+    if (guided) {
+      second_search_.beginFrame(image, templates_);
+      if (askToo(*matcher_, was_guided ? prior_ : *guided, second_search_, kShareOfRest,
+                 std::max(kClearlyMore * frame->matching.statistics.matched, kMajority * expected),
+                 0.0, frame))
+        std::swap(search_, second_search_);  // match indices belong to the search that found them
+    }
   }
   // After some poor frames the ellipses are so wide that chance alone makes a consensus.
   if (poor_frames_ <= kFewPoorFrames) {
@@ -193,7 +188,7 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     const int matched = frame->matching.statistics.matched;
     if (isPoor())
       is_settled =
-          askToo(*longest_matcher_, prior_, search_, 0.5,
+          askToo(*longest_matcher_, prior_, search_, kShareOfRest,
                  std::max(1.0 * matched, kMajority * expected), kCloseChi2PerDegree, frame);
     if (!is_settled && frame->matching.statistics.matched <= kPoorShare * expected)
       askToo(*consensus_matcher_, prior_, search_, 1.0,
@@ -222,7 +217,7 @@ void Tracker::Implementation::correct(TrackedFrame* frame) {
         search_.matches(matched[a])[frame->matching.match_of_feature[matched[a]]];
     innovation.segment<2>(2 * a) = match.pixel - prior_.mean(matched[a]);
   }
-  const Eigen::MatrixXd S = jointCovariance(prior_.S, matched);
+  const Eigen::MatrixXd S = selectFeatures(prior_.S, matched);
   for (int k : agreeingMeasurements(innovation, S, kAgreementChi2))
     fused_.push_back(
         {prior_.ids[matched[k]], prior_.mean(matched[k]) + innovation.segment<2>(2 * k), 0.0});

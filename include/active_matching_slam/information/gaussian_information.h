@@ -16,6 +16,10 @@ namespace active_matching_slam {
 /// Features that determine each other exactly share infinitely many bits; pairs stop at this many.
 constexpr double kMaximumPairBits = 50.0;
 
+/// Joint covariance of some features alone; `features` are indices into S, ascending.
+Eigen::MatrixXd selectFeatures(const Eigen::Ref<const Eigen::MatrixXd>& S,
+                               const std::vector<int>& features);
+
 /// Entropy of a Gaussian, 1/2 log2((2 pi e)^n |P|) (eq. 4.10). Empty when P is not finite or not
 /// positive definite. 0 for n = 0.
 std::optional<double> entropyBits(const Eigen::Ref<const Eigen::MatrixXd>& covariance);

@@ -70,6 +70,9 @@ struct MatchOptions {
   bool keep_trace = false;  ///< record every step in MatchResult::trace
 };
 
+/// Share of the frame's budgets that so much uses up, of the tightest; 0 without a budget.
+double shareOfBudget(const MatchOptions& options, std::int64_t pixels, double milliseconds);
+
 /// Throws std::invalid_argument with name, value and allowed range.
 void checkMatchOptions(const MatchOptions& options);
 

@@ -29,15 +29,4 @@ struct MeasurementPrior {
   auto covariance(int feature) const { return S.block<2, 2>(2 * feature, 2 * feature); }
 };
 
-/// Of some features together, in their order. `S`: 2F x 2F.
-inline Eigen::MatrixXd jointCovariance(const Eigen::MatrixXd& S, const std::vector<int>& features) {
-  const auto n = static_cast<Eigen::Index>(features.size());
-  Eigen::MatrixXd joint(2 * n, 2 * n);
-  for (Eigen::Index a = 0; a < n; ++a)
-    for (Eigen::Index b = 0; b < n; ++b)
-      joint.block<2, 2>(2 * a, 2 * b) = S.block<2, 2>(2 * features[static_cast<std::size_t>(a)],
-                                                      2 * features[static_cast<std::size_t>(b)]);
-  return joint;
-}
-
 }  // namespace active_matching_slam
