@@ -28,5 +28,7 @@ get_property(tests DIRECTORY PROPERTY TESTS)
 foreach(test ${tests})
   if(test MATCHES "_rostest_|_commands$|_machines$")
     set_tests_properties(${test} PROPERTIES RUN_SERIAL TRUE)
+  elseif(test MATCHES "_test_accuracy$")
+    set_tests_properties(${test} PROPERTIES COST 1000)  # the longest begins first
   endif()
 endforeach()
