@@ -4,6 +4,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/rotation.h"
@@ -100,33 +101,51 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
   return N;
 }
 
-/// Solves for the step with the diagonal grown by `damping`. False when not positive definite.
-bool solveStep(const NormalEquations& N, double damping, Eigen::VectorXd* cameras,
-               Eigen::VectorXd* features) {
-  Eigen::MatrixXd S = N.cameras;
-  S.diagonal() *= 1.0 + damping;
-  std::vector<Eigen::Matrix3d> inverse_roots;  // L^-1 of each, where H = L L^T is its block
-  Eigen::MatrixXd reduced(N.cross.rows(), N.cross.cols());  // W L^-T
-  Eigen::VectorXd g(N.feature_gradient.size());             // L^-1 g
+/// The normal equations of the cameras alone, once the features are eliminated.
+struct CameraEquations {
+  Eigen::LLT<Eigen::MatrixXd> factor;          ///< 6K x 6K
+  Eigen::MatrixXd cross;                       ///< W L^-T, where H = L L^T is a feature's block
+  std::vector<Eigen::Matrix3d> inverse_roots;  ///< L^-1 of each feature
+};
+
+/// With the diagonal grown by `damping`. Empty when not positive definite.
+std::optional<CameraEquations> eliminateFeatures(const NormalEquations& N, double damping) {
+  CameraEquations reduced;
+  reduced.cross.resize(N.cross.rows(), N.cross.cols());
+  reduced.inverse_roots.reserve(N.features.size());
   for (std::size_t i = 0; i < N.features.size(); ++i) {
     Eigen::Matrix3d H = N.features[i];
     H.diagonal() *= 1.0 + damping;
     const Eigen::LLT<Eigen::Matrix3d> root(H);
-    if (root.info() != Eigen::Success) return false;
-    inverse_roots.push_back(root.matrixL().solve(Eigen::Matrix3d::Identity()));
+    if (root.info() != Eigen::Success) return std::nullopt;
+    reduced.inverse_roots.push_back(root.matrixL().solve(Eigen::Matrix3d::Identity()));
     const auto column = static_cast<Eigen::Index>(3 * i);
-    reduced.middleCols<3>(column).noalias() =
-        N.cross.middleCols<3>(column).lazyProduct(inverse_roots[i].transpose());
-    g.segment<3>(column) = inverse_roots[i] * N.feature_gradient.segment<3>(column);
+    reduced.cross.middleCols<3>(column).noalias() =
+        N.cross.middleCols<3>(column).lazyProduct(reduced.inverse_roots[i].transpose());
   }
-  S.selfadjointView<Eigen::Lower>().rankUpdate(reduced, -1.0);
-  const Eigen::LLT<Eigen::MatrixXd> factor(S);  // reads the lower triangle
-  if (factor.info() != Eigen::Success) return false;
-  *cameras = factor.solve(N.camera_gradient - reduced * g);
-  *features = g - reduced.transpose() * *cameras;
+  Eigen::MatrixXd S = N.cameras;
+  S.diagonal() *= 1.0 + damping;
+  S.selfadjointView<Eigen::Lower>().rankUpdate(reduced.cross, -1.0);
+  reduced.factor.compute(S);  // reads the lower triangle
+  if (reduced.factor.info() != Eigen::Success) return std::nullopt;
+  return reduced;
+}
+
+/// Solves for the step with the diagonal grown by `damping`. False when not positive definite.
+bool solveStep(const NormalEquations& N, double damping, Eigen::VectorXd* cameras,
+               Eigen::VectorXd* features) {
+  const auto reduced = eliminateFeatures(N, damping);
+  if (!reduced) return false;
+  Eigen::VectorXd g(N.feature_gradient.size());  // L^-1 g
+  for (std::size_t i = 0; i < N.features.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(3 * i);
+    g.segment<3>(row) = reduced->inverse_roots[i] * N.feature_gradient.segment<3>(row);
+  }
+  *cameras = reduced->factor.solve(N.camera_gradient - reduced->cross * g);
+  *features = g - reduced->cross.transpose() * *cameras;
   for (std::size_t i = 0; i < N.features.size(); ++i) {
     auto step = features->segment<3>(static_cast<Eigen::Index>(3 * i));
-    step = (inverse_roots[i].transpose() * step).eval();
+    step = (reduced->inverse_roots[i].transpose() * step).eval();
   }
   return cameras->allFinite() && features->allFinite();
 }
@@ -159,58 +178,57 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
 double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle) {
   double damping = 1e-3;
   NormalEquations N = linearise(model, options, *bundle);
+  double cost = N.cost;
   Eigen::VectorXd camera_step, feature_steps;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
-    double cost = N.cost;
     Bundle trial;
-    bool fell = false;
-    while (!fell && damping < 1e8) {
+    double gain = 0.0;
+    while (!(gain > 0.0) && damping < 1e8) {
       if (solveStep(N, damping, &camera_step, &feature_steps)) {
         trial = *bundle;
         applyStep(options, camera_step, feature_steps, &trial);
-        cost = bundleCost(model, options, trial);
-        fell = cost < N.cost;
+        gain = cost - bundleCost(model, options, trial);
       }
-      damping = fell ? std::max(0.1 * damping, 1e-9) : 10.0 * damping;
+      damping = gain > 0.0 ? std::max(0.1 * damping, 1e-9) : 10.0 * damping;
     }
-    if (!fell) break;
+    if (!(gain > 0.0)) break;
     *bundle = std::move(trial);
-    const double gain = N.cost - cost;
-    N = linearise(model, options, *bundle);
+    cost -= gain;
     const int left = options.max_iterations - 1 - iteration;
-    if (gain < kLeastGain * N.cost || N.cost - left * gain > options.hopeless_cost) break;
+    if (left == 0 || gain < kLeastGain * cost || cost - left * gain > options.hopeless_cost) break;
+    N = linearise(model, options, *bundle);
   }
-  return N.cost;
+  return cost;
 }
 
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera,
                                  double relative_scale_sigma) {
   const NormalEquations N = linearise(model, options, bundle);
-  const int cameras = static_cast<int>(N.cameras.rows());
+  const auto reduced = eliminateFeatures(N, 0.0);
+  if (!reduced) return {};
+  const int cameras = static_cast<int>(N.cameras.rows()), kept = cameras - 6 * (first_camera - 1);
   const int F = static_cast<int>(N.features.size());
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(cameras + 3 * F, cameras + 3 * F);
-  information.topLeftCorner(cameras, cameras) = N.cameras;
-  information.bottomLeftCorner(3 * F, cameras) = N.cross.transpose();
-  Eigen::VectorXd scale = Eigen::VectorXd::Zero(cameras + 3 * F);
+  // With S = R R^T the cameras' equations, W the cross terms and B = diag(L^-1), the covariance is
+  // M^T M + diag(0, B^T B), where M = R^-1 [1, -W L^-T B].
+  Eigen::MatrixXd M(cameras, kept + 3 * F);
+  M.leftCols(kept) = Eigen::MatrixXd::Identity(cameras, cameras).rightCols(kept);
+  Eigen::VectorXd scale = Eigen::VectorXd::Zero(M.cols());
   for (int i = 0; i < F; ++i) {
-    const int o = cameras + 3 * i;
-    information.block<3, 3>(o, o) = N.features[i];
-    scale[o + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
+    M.middleCols<3>(kept + 3 * i).noalias() =
+        -reduced->cross.middleCols<3>(3 * i).lazyProduct(reduced->inverse_roots[i]);
+    scale[kept + 3 * i + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
   }
-  information += scale * scale.transpose() / (relative_scale_sigma * relative_scale_sigma);
-  information.triangularView<Eigen::StrictlyUpper>() = information.transpose();
-  const Eigen::LLT<Eigen::MatrixXd> factor(information);
-  const int kept = cameras + 3 * F - 6 * (first_camera - 1);
-  if (factor.info() != Eigen::Success) return {};
-  // With L = [L1 0; L21 L2], what is kept below, its covariance is L2^-T L2^-1.
-  Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(kept, kept);
-  factor.matrixLLT()
-      .bottomRightCorner(kept, kept)
-      .triangularView<Eigen::Lower>()
-      .solveInPlace(inverse_root);
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(kept, kept);
-  covariance.selfadjointView<Eigen::Lower>().rankUpdate(inverse_root.transpose());
+  reduced->factor.matrixL().solveInPlace(M);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(M.cols(), M.cols());
+  auto lower = covariance.selfadjointView<Eigen::Lower>();
+  lower.rankUpdate(M.transpose());
+  for (int i = 0; i < F; ++i)
+    covariance.block<3, 3>(kept + 3 * i, kept + 3 * i) +=
+        reduced->inverse_roots[i].transpose() * reduced->inverse_roots[i];
+  // The unit is known as well as said: one more measurement, of the mean of the logarithms.
+  const Eigen::VectorXd along = lower * scale;
+  lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + scale.dot(along)));
   covariance.triangularView<Eigen::StrictlyUpper>() = covariance.transpose();
   return covariance;
 }

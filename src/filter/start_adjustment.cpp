@@ -1,6 +1,5 @@
 #include "active_matching_slam/filter/start_adjustment.h"
 
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -370,34 +369,38 @@ std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model
   start.camera.angular_velocity_camera =
       vectorFromRotation(before.q_world_camera.conjugate() * start.camera.q_world_camera) / dt;
 
-  const int F = static_cast<int>(ids.size());
-  const int size = CameraError::kSize + 6 * F;
-  // Rows: the filter's error; columns: cameras before last and last, then the features.
-  Eigen::SparseMatrix<double> J(size, joint.cols());
-  J.reserve(Eigen::VectorXi::Constant(static_cast<int>(joint.cols()), 4));
-  const auto setBlock = [&J](int row, int column, const Eigen::Matrix3d& block) {
-    for (int c = 0; c < 3; ++c)
-      for (int r = 0; r < 3; ++r)
-        if (block(r, c) != 0.0) J.insert(row + r, column + c) = block(r, c);
-  };
+  // The camera's error by those of the cameras before last and last.
+  constexpr int kBefore = 0, kLast = 6, kPoses = 12;
+  using Matrix12 = Eigen::Matrix<double, CameraError::kSize, kPoses>;
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
   const Eigen::Matrix3d R_camera_world = start.camera.q_world_camera.toRotationMatrix().transpose();
-  setBlock(CameraError::kPosition, 6, I);
-  setBlock(CameraError::kRotation, 9, I);
-  setBlock(CameraError::kVelocity, 0, -I / dt);
-  setBlock(CameraError::kVelocity, 6, I / dt);
-  setBlock(CameraError::kAngularVelocity, 3, -R_camera_world / dt);
-  setBlock(CameraError::kAngularVelocity, 9, R_camera_world / dt);
+  Matrix12 J = Matrix12::Zero();
+  J.block<3, 3>(CameraError::kPosition, kLast) = I;
+  J.block<3, 3>(CameraError::kRotation, kLast + 3) = I;
+  J.block<3, 3>(CameraError::kVelocity, kBefore) = -I / dt;
+  J.block<3, 3>(CameraError::kVelocity, kLast) = I / dt;
+  J.block<3, 3>(CameraError::kAngularVelocity, kBefore + 3) = -R_camera_world / dt;
+  J.block<3, 3>(CameraError::kAngularVelocity, kLast + 3) = R_camera_world / dt;
+
+  const int F = static_cast<int>(ids.size());
+  start.covariance = Eigen::MatrixXd::Zero(CameraError::kSize + 6 * F, CameraError::kSize + 6 * F);
+  auto camera = start.covariance.topLeftCorner<CameraError::kSize, CameraError::kSize>();
+  camera = J * joint.topLeftCorner<kPoses, kPoses>() * J.transpose();
+  camera = 0.5 * (camera + camera.transpose()).eval();
   for (int i = 0; i < F; ++i) {
     FeatureState feature = bundle.features[i];
     feature.id = ids[i];
     feature.offset = CameraError::kSize + 6 * i;
-    setBlock(feature.offset + FeatureError::kBearing, 12 + 3 * i, I);
     start.features.push_back(feature);
+    const int row = feature.offset + FeatureError::kBearing, from = kPoses + 3 * i;
+    auto columns = start.covariance.middleCols<3>(row);
+    columns.topRows<CameraError::kSize>() = J * joint.block<kPoses, 3>(0, from);
+    start.covariance.block<3, CameraError::kSize>(row, 0) =
+        columns.topRows<CameraError::kSize>().transpose();
+    for (int k = 0; k < F; ++k)
+      columns.middleRows<3>(CameraError::kSize + 6 * k + FeatureError::kBearing) =
+          joint.block<3, 3>(kPoses + 3 * k, from);
   }
-  const Eigen::MatrixXd rows = J * joint;
-  start.covariance = rows * J.transpose();
-  start.covariance = 0.5 * (start.covariance + start.covariance.transpose()).eval();
   const FilterOptions& noise = filter.options();
   start.covariance.diagonal().segment<3>(CameraError::kVelocity).array() +=
       std::pow(noise.sigma_acceleration_mps2 * dt, 2);
