@@ -192,25 +192,35 @@ Scene makeTwoDepths(std::uint64_t seed) {
   SceneBuilder b("two_depths", seed);
   b.scene().ambient = 0.75;
   b.scene().light_grid_m = 0.16;
-  b.density(150);
-  b.room({-5.0, -1.5, 0.0}, {5.0, 9.0, 5.0},
-         [](const Canvas& c) { return paintTiles(c, 0.5, 0.34); }, plaster(0.75),
-         {paintBricks, plaster(0.6), plaster(0.6), plaster(0.6)});
-  const double places[] = {-3.4, -1.8, -0.3, 1.3, 2.9};
-  for (double x : places)
-    frame(b, {x, 9.0, 2.9 + 0.25 * b.random().uniform(-1, 1)}, kSeenLookingNorth, 1.1, 1.4,
-          paintPoster);
-  b.density(900);
-  b.table({0, 0.75, 0}, 0.0, {1.5, 0.7, 0.8}, 0.5);
+  b.density(110);
+  b.room({-8.0, -1.5, 0.0}, {8.0, 12.0, 6.0}, wood(0.4, 0.2), plaster(0.75),
+         {plaster(0.6), plaster(0.6), plaster(0.6), plaster(0.6)});
+  for (int i = 0; i < 7; ++i)
+    for (int row = 0; row < 3; ++row)
+      b.upright({-6.3 + 2.1 * i + 0.3 * b.random().uniform(-1, 1), 11.995,
+                 1.1 + 1.7 * row + 0.15 * b.random().uniform(-1, 1)},
+                kSeenLookingNorth, b.random().uniform(1.1, 1.7), b.random().uniform(1.1, 1.4),
+                b.random().uniform() < 0.7 ? Paint(paintPoster) : Paint(paintCorkBoard));
+  // Small things half a metre off; they rise before the wall, so that near and far lie side by side
+  // in the image.
+  b.density(1850);
+  b.table({0, 0.31, 0}, 0.0, {1.33, 0.56, 0.8}, 0.5);
+  for (int i = 0; i < 5; ++i) {
+    const double x = -0.448 + 0.224 * i + 0.021 * b.random().uniform(-1, 1);
+    const double y = 0.275 + 0.056 * b.random().uniform(-1, 1);
+    const double yaw = b.random().uniform(-0.4, 0.4);
+    b.box({x, y, 0.8}, yaw, {0.14, 0.105, 0.14}, paintPoster);
+    if (i % 2 == 0)
+      b.box({x, y, 0.94}, yaw + 0.2, {0.112, 0.084, 0.14}, paintPoster);
+    else
+      b.pile({x, y, 0.94}, yaw, 3, 0.105, 0.084, paintBookCover);
+  }
   for (int i = 0; i < 5; ++i)
-    b.box({-0.58 + 0.28 * i, 0.75 + 0.1 * b.random().uniform(-1, 1), 0.8},
-          b.random().uniform(-0.5, 0.5), {0.17, 0.14, b.random().uniform(0.12, 0.26)},
-          i % 2 == 0 ? Paint(paintPackage) : Paint(paintBookCover));
-  b.level({-0.3, 0.5, 0.8012}, 0.3, 0.21, 0.297, paintPage);
-  b.level({0.25, 0.5, 0.8012}, -0.2, 0.21, 0.297, paintPage);
-  for (double x : {-2.0, 2.0}) b.lamp({x, 5.5, 4.8}, 0.8, 7.0, {0.0, 0.8, -1.0});
-  b.lamp({0.0, 0.0, 3.0}, 0.6, 2.0);
-  b.start({0.0, -0.35, 1.25}, 0.5 * kPi, 0.2, {-0.6, -0.2, -0.3}, {0.6, 0.2, 0.3}, 0.6);
+    b.level({-0.35 + 0.175 * i, 0.135, 0.8012 + 0.0004 * i}, b.random().uniform(-0.5, 0.5), 0.148,
+            0.21, paintPage);
+  for (double x : {-3.0, 3.0}) b.lamp({x, 7.5, 5.8}, 0.8, 14.0, {0.0, 0.8, -1.0});
+  b.lamp({0.0, -0.4, 3.0}, 0.6, 5.0, {0.0, 0.3, -1.0});
+  b.start({0.0, -0.25, 1.08}, 0.5 * kPi, 0.1, {-0.28, -0.1, -0.14}, {0.28, 0.1, 0.14}, 0.28);
   return b.finish();
 }
 

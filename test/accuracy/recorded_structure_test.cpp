@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -67,6 +68,32 @@ TEST_P(RecordedStructure, SubmapsPreserveMoreThanNaivePartsAtEveryLevel) {
   const int features = static_cast<int>(first.submap_of_feature.size());
   EXPECT_GT(bitsInside(*last->graph, first.submap_of_feature),
             1.2 * bitsInside(*last->graph, naivePartition(features, first.submaps)));
+}
+
+// With about as many features in a frame as the thesis's maps have, also the first level.
+TEST_P(RecordedStructure, SparseMapsPreserveMoreThanNaivePartsAtTheFirstLevelToo) {
+  TrackerOptions options;
+  options.structure = true;
+  options.map.features_per_frame = 15;
+  RecordedSequence sequence(recordedDataFolder() + "/" + GetParam());
+  Tracker tracker(sequence.camera(), options);
+  std::shared_ptr<const TrackedFrame> last;
+  sequence.forEachFrame([&](const cv::Mat& image, double stamp_s) {
+    const auto frame = tracker.track(image, stamp_s);
+    if (frame->submaps) last = frame;
+    return true;
+  });
+  ASSERT_TRUE(last);
+  int intermediate = 0;
+  for (const SubmapLevel& level : last->submaps->levels) {
+    if (!isIntermediate(level)) continue;
+    ++intermediate;
+    std::printf("%s: %zu features in %d submaps: preserved %.3f, naive %.3f\n", GetParam(),
+                level.submap_of_feature.size(), level.submaps, level.preserved_chow_liu,
+                level.preserved_naive);
+    EXPECT_GT(level.preserved_chow_liu, level.preserved_naive) << level.submaps << " submaps";
+  }
+  EXPECT_GE(intermediate, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sequences, RecordedStructure,
