@@ -15,8 +15,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using MatrixRef = Eigen::Ref<const MatrixXd>;
 
-constexpr double kPi = 3.14159265358979323846;
-
 void checkSquare(const MatrixRef& matrix, const char* name, int divisor = 1) {
   if (matrix.rows() == matrix.cols() && matrix.rows() % divisor == 0) return;
   throw std::invalid_argument(std::string(name) + " is " + std::to_string(matrix.rows()) + " x " +
@@ -125,7 +123,7 @@ std::optional<double> entropyBits(const MatrixRef& covariance) {
   checkSquare(covariance, "covariance");
   const std::optional<MatrixXd> factor = choleskyFactor(covariance);
   if (!factor) return std::nullopt;
-  const double per_dimension = std::log2(2.0 * kPi) + 1.0 / std::log(2.0);
+  const double per_dimension = std::log2(2.0 * M_PI) + 1.0 / std::log(2.0);
   return 0.5 * (covariance.rows() * per_dimension + logDeterminantBits(*factor));
 }
 
@@ -254,7 +252,7 @@ MatrixXd pairInformationMatrix(const MatrixRef& S) {
 
 double ellipseArea(const Eigen::Matrix2d& covariance) {
   const double determinant = determinant2(covariance);
-  return determinant > 0.0 && covariance(0, 0) > 0.0 ? 9.0 * kPi * std::sqrt(determinant) : 0.0;
+  return determinant > 0.0 && covariance(0, 0) > 0.0 ? 9.0 * M_PI * std::sqrt(determinant) : 0.0;
 }
 
 double informationEfficiency(double bits, double area_px) {

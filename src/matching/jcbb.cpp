@@ -4,6 +4,7 @@
 #include "baseline_matchers.h"
 #include "chi_square.h"
 #include "gate_search.h"
+#include "slot.h"
 
 namespace active_matching_slam {
 namespace {
@@ -52,8 +53,6 @@ class BranchAndBound {
     int match;
     Eigen::Vector2d y;
   };
-
-  static std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
   bool isOutOfBudget() {
     if (options_.jcbb_max_nodes > 0 && nodes_ >= options_.jcbb_max_nodes) cut_short_ = true;

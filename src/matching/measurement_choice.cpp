@@ -4,12 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "slot.h"
+
 namespace active_matching_slam {
 namespace {
 
 constexpr double kLog2E = 1.44269504088896340736;
-
-std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

@@ -6,14 +6,9 @@
 #include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "gaussian_mass.h"
+#include "slot.h"
 
 namespace active_matching_slam {
-namespace {
-
-std::size_t slot(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
                  std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
     : prior_(prior),

@@ -7,6 +7,7 @@
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "gaussian_mass.h"
 #include "mixture.h"
+#include "slot.h"
 
 namespace active_matching_slam {
 namespace {
@@ -19,8 +20,6 @@ constexpr std::size_t kCompared = 16, kContradicted = 8;
 constexpr std::size_t kMostKnown = 32;
 /// Features missed beyond what their rates explain that make one doubt.
 constexpr double kSurpriseSigmas = 3.0;
-
-std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 /// A Gaussian of image points of which one after the other becomes known.
 class PredictionChain {

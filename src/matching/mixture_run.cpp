@@ -3,14 +3,13 @@
 #include <algorithm>
 
 #include "active_matching_slam/matching/search_ellipse.h"
+#include "slot.h"
 
 namespace active_matching_slam {
 namespace {
 
 /// Share of the budget after which the heaviest Gaussian is taken whether it dominates or not.
 constexpr double kBudgetForDoubt = 0.75;
-
-std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 std::vector<SearchLikelihood> likelihoodsOf(const MeasurementPrior& given, const ProperPrior& prior,
                                             const MatchOptions& options) {

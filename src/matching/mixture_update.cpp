@@ -6,6 +6,7 @@
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "gaussian_mass.h"
 #include "mixture.h"
+#include "slot.h"
 
 namespace active_matching_slam {
 namespace {
@@ -17,8 +18,6 @@ constexpr double kLeastLikelihood = 1e-9;
 constexpr double kScoreCredit = 20.0;
 /// Dropped hypotheses that are kept for the recount, so many at most.
 constexpr std::size_t kMostAside = 32;
-
-std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

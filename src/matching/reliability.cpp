@@ -6,11 +6,10 @@
 
 #include "active_matching_slam/matching/matcher.h"
 #include "active_matching_slam/matching/search_ellipse.h"
+#include "slot.h"
 
 namespace active_matching_slam {
 namespace {
-
-std::size_t slot(int i) { return static_cast<std::size_t>(i); }
 
 /// By feature, the ellipses that the accepted hypothesis and its ancestors searched.
 std::vector<std::vector<SearchEllipse>> lineageOf(const MatchResult& result) {

@@ -14,7 +14,7 @@ namespace {
 
 /// An image is only handed on, so that a queue is no delay. It is long so that what the worker
 /// leaves behind is counted there, and not lost unseen here while a service is answered.
-constexpr int kQueueSize = 50;
+constexpr int kSubscriberQueueSize = 50;
 /// camera_info may come a little later than the first image.
 constexpr double kInfoDelay_s = 2.0;
 
@@ -73,7 +73,7 @@ void CameraSubscription::start(const std::string& transport, Callback callback) 
           deliver(std::move(image));
         };
     image_subscriber_ = image_transport_.subscribe(
-        base_topic, kQueueSize, receive, ros::VoidPtr(),
+        base_topic, kSubscriberQueueSize, receive, ros::VoidPtr(),
         image_transport::TransportHints(transport, ros::TransportHints().tcpNoDelay()));
   } else if (transport == "compressed") {
     const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> receive =
@@ -83,7 +83,8 @@ void CameraSubscription::start(const std::string& transport, Callback callback) 
           deliver(std::move(image));
         };
     compressed_subscriber_ = node_.subscribe<sensor_msgs::CompressedImage>(
-        image_topic_, kQueueSize, receive, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
+        image_topic_, kSubscriberQueueSize, receive, ros::VoidConstPtr(),
+        ros::TransportHints().tcpNoDelay());
   } else {
     std::string names;
     for (const std::string& plugin : plugins) names += " " + plugin.substr(plugin.find('/') + 1);

@@ -9,7 +9,7 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kQueueSize = 10;
+constexpr int kPublisherQueueSize = 10;
 
 bool hasListener(const ros::Publisher& publisher) { return publisher.getNumSubscribers() > 0; }
 
@@ -33,14 +33,14 @@ void FramePublisher::MarkerTopic::publish(const std_msgs::Header& header, Make m
 
 FramePublisher::FramePublisher(const ros::NodeHandle& private_node, const NodeOptions& options)
     : options_(options), node_(private_node), image_transport_(private_node) {
-  state_ = node_.advertise<ams_msgs::TrackingState>("state", kQueueSize, true);
-  pose_ = node_.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueueSize);
-  odometry_ = node_.advertise<nav_msgs::Odometry>("odometry", kQueueSize);
+  state_ = node_.advertise<ams_msgs::TrackingState>("state", kPublisherQueueSize, true);
+  pose_ = node_.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kPublisherQueueSize);
+  odometry_ = node_.advertise<nav_msgs::Odometry>("odometry", kPublisherQueueSize);
   path_ = node_.advertise<nav_msgs::Path>("path", 1);
   map_ = node_.advertise<sensor_msgs::PointCloud2>("map", 1);
-  features_ = node_.advertise<ams_msgs::FeatureArray>("features", kQueueSize);
-  statistics_ = node_.advertise<ams_msgs::MatchingStatistics>("statistics", kQueueSize);
-  hypotheses_ = node_.advertise<ams_msgs::MatchHypotheses>("hypotheses", kQueueSize);
+  features_ = node_.advertise<ams_msgs::FeatureArray>("features", kPublisherQueueSize);
+  statistics_ = node_.advertise<ams_msgs::MatchingStatistics>("statistics", kPublisherQueueSize);
+  hypotheses_ = node_.advertise<ams_msgs::MatchHypotheses>("hypotheses", kPublisherQueueSize);
   mutual_information_ = node_.advertise<ams_msgs::MutualInformationGraph>("mutual_information", 1);
   submaps_ = node_.advertise<ams_msgs::SubmapHierarchy>("submaps", 1);
   const auto advertiseMarkers = [&](const std::string& name) {

@@ -8,8 +8,7 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegree = kPi / 180.0;
+constexpr double kDegree = M_PI / 180.0;
 /// Time over which the motion gathers way.
 constexpr double kRampS = 1.0;
 
@@ -34,8 +33,8 @@ void addHandNoise(HarmonicSum& sum, double rms_velocity, double low_hz, double h
   constexpr int kTerms = 7;
   for (int i = 0; i < kTerms; ++i) {
     const double share = (i + random.uniform()) / kTerms;
-    const double rate = 2.0 * kPi * low_hz * std::pow(high_hz / low_hz, share);
-    sum.add(rms_velocity * std::sqrt(2.0 / kTerms) / rate, rate, random.uniform(0.0, 2.0 * kPi));
+    const double rate = 2.0 * M_PI * low_hz * std::pow(high_hz / low_hz, share);
+    sum.add(rms_velocity * std::sqrt(2.0 / kTerms) / rate, rate, random.uniform(0.0, 2.0 * M_PI));
   }
 }
 
@@ -51,23 +50,23 @@ void addHand(Motion::Components& c, double rms_m_s, double rms_rad_s, double low
 /// about meanwhile.
 void addLookAround(Motion::Components& c, double size_m, double yaw_rad, double period_s,
                    Random& random) {
-  const double rate = 2.0 * kPi / period_s;
+  const double rate = 2.0 * M_PI / period_s;
   const double side = random.sign();
   const auto vary = [&random](double value) { return value * random.uniform(0.85, 1.15); };
   c[kX].add(side * vary(0.55 * size_m), rate, 0.0);
   c[kY].add(random.sign() * vary(0.13 * size_m), 2.0 * rate, random.uniform(-0.4, 0.4));
-  c[kZ].add(vary(0.25 * size_m), rate, random.uniform(-0.3, 0.3) + 0.5 * kPi);
-  c[kZ].add(vary(0.08 * size_m), 2.0 * rate, random.uniform(0.0, 2.0 * kPi));
+  c[kZ].add(vary(0.25 * size_m), rate, random.uniform(-0.3, 0.3) + 0.5 * M_PI);
+  c[kZ].add(vary(0.08 * size_m), 2.0 * rate, random.uniform(0.0, 2.0 * M_PI));
   c[kYaw].add(-side * vary(yaw_rad), rate, 0.35 * random.sign());
-  c[kYaw].add(vary(0.3 * yaw_rad), 2.0 * rate, random.uniform(0.0, 2.0 * kPi));
-  c[kPitch].add(vary(8.0 * kDegree), 2.0 * rate, random.uniform(0.0, 2.0 * kPi));
-  c[kRoll].add(vary(5.0 * kDegree), rate, random.uniform(0.0, 2.0 * kPi));
+  c[kYaw].add(vary(0.3 * yaw_rad), 2.0 * rate, random.uniform(0.0, 2.0 * M_PI));
+  c[kPitch].add(vary(8.0 * kDegree), 2.0 * rate, random.uniform(0.0, 2.0 * M_PI));
+  c[kRoll].add(vary(5.0 * kDegree), rate, random.uniform(0.0, 2.0 * M_PI));
 }
 
 /// There and back between 0 and `distance`, at most at `speed` and never faster than in 4 s.
 void addThereAndBack(HarmonicSum& sum, double distance_m, double speed_m_s) {
-  const double rate = std::min(2.0 * speed_m_s / std::max(std::abs(distance_m), 1e-9), 0.5 * kPi);
-  sum.add(0.5 * distance_m, rate, -0.5 * kPi);
+  const double rate = std::min(2.0 * speed_m_s / std::max(std::abs(distance_m), 1e-9), 0.5 * M_PI);
+  sum.add(0.5 * distance_m, rate, -0.5 * M_PI);
 }
 
 double farther(double low, double high) { return high >= -low ? high : low; }
@@ -96,11 +95,11 @@ Motion::Components components(const std::string& name, const Stage& stage, Rando
     addThereAndBack(c[kZ], farther(stage.reach_min_m.z(), stage.reach_max_m.z()), 0.6 * size);
     addHand(c, 0.01 * size, 0.012, 0.3, 2.0, random);
   } else if (name == "circle") {
-    const double rate = 2.0 * kPi / 6.0, radius = 0.3 * size;
+    const double rate = 2.0 * M_PI / 6.0, radius = 0.3 * size;
     c[kX].add(radius, rate, 0.0);
-    c[kY].add(radius, rate, 0.5 * kPi);
+    c[kY].add(radius, rate, 0.5 * M_PI);
     c[kYaw].add(-4.0 * kDegree, rate, 0.0);
-    c[kPitch].add(4.0 * kDegree, rate, 0.5 * kPi);
+    c[kPitch].add(4.0 * kDegree, rate, 0.5 * M_PI);
   } else if (name == "shake") {
     addHand(c, 0.1 * size, 0.45, 1.8, 4.0, random);
   }  // still: nothing moves

@@ -12,8 +12,6 @@ Vector3d turned(double yaw_rad, double x, double y, double z) {
           std::sin(yaw_rad) * x + std::cos(yaw_rad) * y, z};
 }
 
-constexpr double kPi = 3.14159265358979323846;
-
 }  // namespace
 
 void SceneBuilder::add(const Vector3d& centre, const Vector3d& u, const Vector3d& v, double width_m,
@@ -60,17 +58,17 @@ void SceneBuilder::box(const Vector3d& base_centre, double yaw_rad, const Vector
   const auto face = [&](double x, double y) {
     return Vector3d(middle + turned(yaw_rad, 0.5 * x * size.x(), 0.5 * y * size.y(), 0));
   };
-  solidUpright(face(0, -1), yaw_rad - 0.5 * kPi, size.x(), size.z(), front);
+  solidUpright(face(0, -1), yaw_rad - 0.5 * M_PI, size.x(), size.z(), front);
   solidUpright(face(1, 0), yaw_rad, size.y(), size.z(), sides);
-  solidUpright(face(0, 1), yaw_rad + 0.5 * kPi, size.x(), size.z(), sides);
-  solidUpright(face(-1, 0), yaw_rad + kPi, size.y(), size.z(), sides);
+  solidUpright(face(0, 1), yaw_rad + 0.5 * M_PI, size.x(), size.z(), sides);
+  solidUpright(face(-1, 0), yaw_rad + M_PI, size.y(), size.z(), sides);
   solidLevel(base_centre + Vector3d(0, 0, size.z()), yaw_rad, size.x(), size.y(), top);
   if (bottom) solidLevel(base_centre, yaw_rad, size.x(), size.y(), sides, false);
 }
 
 void SceneBuilder::prism(const Vector3d& base_centre, double radius_m, double height_m, int sides,
                          const Paint& side, const Paint& lid) {
-  const double step = 2.0 * kPi / sides;
+  const double step = 2.0 * M_PI / sides;
   const double apothem = radius_m * std::cos(0.5 * step),
                width = 2.0 * radius_m * std::sin(0.5 * step);
   for (int i = 0; i < sides; ++i)
@@ -119,7 +117,7 @@ void SceneBuilder::bookcase(const Vector3d& base_centre, double yaw_rad, double 
   };
   for (double side : {-1.0, 1.0})
     box(place(side * 0.5 * (width_m - kBoard), 0, 0), yaw_rad, {kBoard, kDepth, height_m}, wood);
-  upright(place(0, 0.5 * kDepth - 0.01, 0.5 * height_m), yaw_rad - 0.5 * kPi, width_m, height_m,
+  upright(place(0, 0.5 * kDepth - 0.01, 0.5 * height_m), yaw_rad - 0.5 * M_PI, width_m, height_m,
           back);
   const double pitch = (height_m - kBoard) / boards, inside = width_m - 2.0 * kBoard;
   for (int i = 0; i <= boards; ++i) {
@@ -147,7 +145,7 @@ void SceneBuilder::monitor(const Vector3d& base_centre, double yaw_rad, double w
   box(base_centre, yaw_rad, {0.24, 0.18, 0.012}, dark);
   box(base_centre + turned(yaw_rad, 0, 0.03, 0.012), yaw_rad, {0.05, 0.03, 0.12}, dark);
   box(base_centre + turned(yaw_rad, 0, 0, 0.11), yaw_rad, {width_m, 0.035, height}, dark, true);
-  upright(base_centre + turned(yaw_rad, 0, -0.0185, 0.11 + 0.5 * height), yaw_rad - 0.5 * kPi,
+  upright(base_centre + turned(yaw_rad, 0, -0.0185, 0.11 + 0.5 * height), yaw_rad - 0.5 * M_PI,
           width_m, height, screen, 0.6);
 }
 
@@ -167,9 +165,9 @@ void SceneBuilder::room(const Vector3d& low, const Vector3d& high, const Paint& 
   const Vector3d size = high - low, middle = 0.5 * (low + high);
   solidLevel({middle.x(), middle.y(), low.z()}, 0.0, size.x(), size.y(), floor);
   solidLevel({middle.x(), middle.y(), high.z()}, 0.0, size.x(), size.y(), ceiling, false);
-  solidUpright({middle.x(), high.y(), middle.z()}, -0.5 * kPi, size.x(), size.z(), walls[0]);
-  solidUpright({high.x(), middle.y(), middle.z()}, kPi, size.y(), size.z(), walls[1]);
-  solidUpright({middle.x(), low.y(), middle.z()}, 0.5 * kPi, size.x(), size.z(), walls[2]);
+  solidUpright({middle.x(), high.y(), middle.z()}, -0.5 * M_PI, size.x(), size.z(), walls[0]);
+  solidUpright({high.x(), middle.y(), middle.z()}, M_PI, size.y(), size.z(), walls[1]);
+  solidUpright({middle.x(), low.y(), middle.z()}, 0.5 * M_PI, size.x(), size.z(), walls[2]);
   solidUpright({low.x(), middle.y(), middle.z()}, 0.0, size.y(), size.z(), walls[3]);
 }
 
@@ -181,8 +179,8 @@ void SceneBuilder::lamp(const Vector3d& position, double size_m, double intensit
 void SceneBuilder::sky(const Vector3d& middle, double distance_m, double height_m) {
   const Paint paint = [](const Canvas& c) { return paintSky(c); };
   for (int i = 0; i < 4; ++i) {
-    const double angle = 0.5 * kPi * i;
-    upright(middle + turned(angle, distance_m, 0, 0.45 * height_m), angle + kPi, 2.0 * distance_m,
+    const double angle = 0.5 * M_PI * i;
+    upright(middle + turned(angle, distance_m, 0, 0.45 * height_m), angle + M_PI, 2.0 * distance_m,
             height_m, i == 1 ? Paint([](const Canvas& c) { return paintLandscape(c); }) : paint,
             1.0);
   }

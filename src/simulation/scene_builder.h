@@ -87,6 +87,15 @@ class SceneBuilder {
   double density_ = 400.0;
 };
 
+/// A surface of one grey level, 0 to 1, with nothing on it.
+inline SceneBuilder::Paint plain(double level) {
+  return [level](const Canvas& c) { return paintPlain(c, level); };
+}
+/// A wall of that grey level.
+inline SceneBuilder::Paint plaster(double level) {
+  return [level](const Canvas& c) { return paintPlaster(c, level); };
+}
+
 /// The places of scenes_indoor.cpp and scenes_long.cpp.
 Scene makeRoom(std::uint64_t seed);
 Scene makeOffice(std::uint64_t seed);

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "scene_builder.h"
 
 namespace active_matching_slam {
@@ -6,20 +8,12 @@ namespace {
 using Eigen::Vector3d;
 using Paint = SceneBuilder::Paint;
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// Facing of an upright rectangle that is seen when looking along the named direction.
-constexpr double kSeenLookingNorth = -0.5 * kPi;  // +y
-constexpr double kSeenLookingEast = kPi;          // +x
-constexpr double kSeenLookingSouth = 0.5 * kPi;
+constexpr double kSeenLookingNorth = -0.5 * M_PI;  // +y
+constexpr double kSeenLookingEast = M_PI;          // +x
+constexpr double kSeenLookingSouth = 0.5 * M_PI;
 constexpr double kSeenLookingWest = 0.0;
 
-Paint plain(double level) {
-  return [level](const Canvas& c) { return paintPlain(c, level); };
-}
-Paint plaster(double level) {
-  return [level](const Canvas& c) { return paintPlaster(c, level); };
-}
 Paint wood(double level, double plank_m = 0.0) {
   return [=](const Canvas& c) { return paintWood(c, level, plank_m); };
 }
@@ -30,7 +24,7 @@ Paint fabric(double level) {
 /// A framed picture: a thin box, so it stands off the wall.
 void frame(SceneBuilder& b, const Vector3d& centre, double facing, double w, double h,
            const Paint& picture) {
-  const double yaw = facing + 0.5 * kPi;
+  const double yaw = facing + 0.5 * M_PI;
   const Vector3d out(std::cos(facing), std::sin(facing), 0.0);
   b.box(centre + 0.012 * out - Vector3d(0, 0, 0.5 * h), yaw, {w, 0.024, h}, picture, plain(0.12),
         plain(0.12), true);
@@ -88,7 +82,7 @@ Scene makeRoom(std::uint64_t seed) {
   b.box({1.97, 0.95, 0.42}, -0.9, {0.72, 0.16, 0.45}, fabric(0.42));
   b.box({1.7, 0.72, 0.42}, -1.3, {0.4, 0.38, 0.1}, paintWallpaper);
   // West: posters on bricks, a sideboard.
-  b.box({-2.15, 0.4, 0}, 0.5 * kPi, {1.4, 0.42, 0.78}, paintDoor, wood(0.5), wood(0.56));
+  b.box({-2.15, 0.4, 0}, 0.5 * M_PI, {1.4, 0.42, 0.78}, paintDoor, wood(0.5), wood(0.56));
   b.pile({-2.15, 0.8, 0.78}, 1.4, 5, 0.24, 0.3, paintBookCover);
   b.box({-2.15, 0.1, 0.78}, 1.8, {0.3, 0.2, 0.22}, paintPackage);
   mug(b, {-2.02, 0.45, 0.78}, 0.85);
@@ -98,7 +92,7 @@ Scene makeRoom(std::uint64_t seed) {
   // South: behind the camera at the start.
   b.upright({-1.2, -1.995, 1.0}, kSeenLookingSouth, 0.9, 2.0, paintDoor);
   frame(b, {0.6, -2.0, 1.6}, kSeenLookingSouth, 0.9, 0.65, paintPoster);
-  b.bookcase({1.7, -1.84, 0}, kPi, 1.0, 1.2, 3);
+  b.bookcase({1.7, -1.84, 0}, M_PI, 1.0, 1.2, 3);
   // A low table in front.
   b.table({-0.55, 0.72, 0}, 0.25, {0.85, 0.5, 0.42}, 0.4);
   b.pile({-0.75, 0.72, 0.42}, 0.5, 3, 0.22, 0.28, paintBookCover);
@@ -107,7 +101,7 @@ Scene makeRoom(std::uint64_t seed) {
   b.level({0.3, 0.2, 2.595}, 0.0, 0.5, 0.5, plain(0.95), false, 1.2);
   b.lamp({0.3, 0.2, 2.5}, 0.5, 1.7);
   b.lamp({2.3, 0.55, 1.6}, 0.9, 1.3, {-1.0, 0.0, -0.2});
-  b.start({0.0, -0.75, 1.4}, 0.5 * kPi, 0.16, {-0.9, -0.35, -0.5}, {0.9, 0.35, 0.7}, 1.0);
+  b.start({0.0, -0.75, 1.4}, 0.5 * M_PI, 0.16, {-0.9, -0.35, -0.5}, {0.9, 0.35, 0.7}, 1.0);
   return b.finish();
 }
 
@@ -130,8 +124,8 @@ Scene makeOffice(std::uint64_t seed) {
       b.upright({x + 0.55, y + 0.41, 0.98}, kSeenLookingNorth, 0.4, 0.26, paintCorkBoard);
       b.chair({x + 0.2, y - 0.65, 0}, 2.8 + 0.5 * column);
     }
-  b.bookcase({-3.83, 1.0, 0}, 0.5 * kPi, 1.3, 2.0, 5);
-  b.bookcase({-3.83, 2.6, 0}, 0.5 * kPi, 1.3, 2.0, 5);
+  b.bookcase({-3.83, 1.0, 0}, 0.5 * M_PI, 1.3, 2.0, 5);
+  b.bookcase({-3.83, 2.6, 0}, 0.5 * M_PI, 1.3, 2.0, 5);
   b.box({3.0, 2.3, 0}, 0.0, {0.45, 0.45, 2.9}, paintConcrete);
   b.box({3.5, 1.1, 0}, 0.0, {0.5, 0.6, 1.3}, plain(0.55));
   b.box({3.3, 3.6, 0}, 0.4, {0.5, 0.4, 0.35}, paintPackage);
@@ -147,7 +141,7 @@ Scene makeOffice(std::uint64_t seed) {
       b.level({x, y, 2.895}, 0.0, 0.6, 0.6, plain(0.95), false, 1.0);
       b.lamp({x, y, 2.85}, 0.6, 1.6);
     }
-  b.start({0.0, -0.9, 1.55}, 0.5 * kPi, 0.15, {-1.2, -0.4, -0.9}, {1.2, 0.4, 0.9}, 1.2);
+  b.start({0.0, -0.9, 1.55}, 0.5 * M_PI, 0.15, {-1.2, -0.4, -0.9}, {1.2, 0.4, 0.9}, 1.2);
   return b.finish();
 }
 
@@ -169,7 +163,7 @@ Scene makeDesk(std::uint64_t seed) {
   b.upright({0.42, 0.847, 1.3}, kSeenLookingNorth, 0.6, 0.45, paintCorkBoard);
   b.lamp({0.5, -0.4, 2.2}, 0.4, 1.3);
   b.lamp({-1.2, 0.2, 1.6}, 0.3, 0.45, {1.0, 0.2, -0.5});
-  b.start({0.0, -0.42, 1.28}, 0.5 * kPi, 0.55, {-0.4, -0.15, -0.3}, {0.4, 0.15, 0.3}, 0.4);
+  b.start({0.0, -0.42, 1.28}, 0.5 * M_PI, 0.55, {-0.4, -0.15, -0.3}, {0.4, 0.15, 0.3}, 0.4);
   return b.finish();
 }
 
@@ -184,7 +178,7 @@ Scene makeCheckerboard(std::uint64_t seed) {
   b.level({0.0, 0.25, 0.003}, 0.0, 0.96, 0.72,
           [](const Canvas& c) { return paintCheckerboard(c, 0.04); });
   b.lamp({0.4, 0.0, 2.2}, 0.5, 1.3);
-  b.start({0.0, -0.35, 0.62}, 0.5 * kPi, 0.8, {-0.3, -0.15, -0.25}, {0.3, 0.12, 0.25}, 0.3);
+  b.start({0.0, -0.35, 0.62}, 0.5 * M_PI, 0.8, {-0.3, -0.15, -0.25}, {0.3, 0.12, 0.25}, 0.3);
   return b.finish();
 }
 
@@ -220,7 +214,7 @@ Scene makeTwoDepths(std::uint64_t seed) {
             0.21, paintPage);
   for (double x : {-3.0, 3.0}) b.lamp({x, 7.5, 5.8}, 0.8, 14.0, {0.0, 0.8, -1.0});
   b.lamp({0.0, -0.4, 3.0}, 0.6, 5.0, {0.0, 0.3, -1.0});
-  b.start({0.0, -0.25, 1.08}, 0.5 * kPi, 0.1, {-0.28, -0.1, -0.14}, {0.28, 0.1, 0.14}, 0.28);
+  b.start({0.0, -0.25, 1.08}, 0.5 * M_PI, 0.1, {-0.28, -0.1, -0.14}, {0.28, 0.1, 0.14}, 0.28);
   return b.finish();
 }
 

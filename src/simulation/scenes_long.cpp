@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "scene_builder.h"
 
 namespace active_matching_slam {
@@ -5,15 +7,6 @@ namespace {
 
 using Eigen::Vector3d;
 using Paint = SceneBuilder::Paint;
-
-constexpr double kPi = 3.14159265358979323846;
-
-Paint plain(double level) {
-  return [level](const Canvas& c) { return paintPlain(c, level); };
-}
-Paint plaster(double level) {
-  return [level](const Canvas& c) { return paintPlaster(c, level); };
-}
 
 }  // namespace
 
@@ -30,15 +23,15 @@ Scene makeCorridor(std::uint64_t seed) {
   for (int i = 0; i < 7; ++i) {
     const double y = 0.9 + 3.1 * i;
     const auto across = [&](double offset) { return y + offset + b.random().uniform(-0.2, 0.2); };
-    b.upright({1.195, across(0.0), 1.6}, kPi, 0.6, 0.85, paintPoster);
-    b.upright({1.195, across(0.9), 1.55}, kPi, 0.7, 0.5, paintCorkBoard);
-    b.upright({1.195, across(2.0), 1.02}, kPi, 0.9, 2.04, paintDoor);
+    b.upright({1.195, across(0.0), 1.6}, M_PI, 0.6, 0.85, paintPoster);
+    b.upright({1.195, across(0.9), 1.55}, M_PI, 0.7, 0.5, paintCorkBoard);
+    b.upright({1.195, across(2.0), 1.02}, M_PI, 0.9, 2.04, paintDoor);
     b.upright({-1.195, across(0.4), 1.55}, 0.0, 0.8, 0.6, paintPoster);
     b.upright({-1.195, across(1.7), 1.6}, 0.0, 0.5, 0.7, paintPoster);
     b.level({0, y + 0.5, 2.595}, 0.0, 0.3, 1.2, plain(0.95), false, 1.0);
     b.lamp({0, y + 0.5, 2.55}, 0.6, 1.1);
   }
-  b.start({0.0, 0.0, 1.5}, 0.5 * kPi, 0.05, {-0.5, -0.3, -0.4}, {0.5, 0.3, 16.0}, 1.0);
+  b.start({0.0, 0.0, 1.5}, 0.5 * M_PI, 0.05, {-0.5, -0.3, -0.4}, {0.5, 0.3, 16.0}, 1.0);
   return b.finish();
 }
 
@@ -50,17 +43,17 @@ Scene makeWall(std::uint64_t seed) {
   b.density(1);
   b.sky({kMiddle, 0, 0}, 100, 60);
   b.density(220);
-  b.upright({kMiddle, 2.0, 1.6}, -0.5 * kPi, kLength, 4.0, paintBricks);
+  b.upright({kMiddle, 2.0, 1.6}, -0.5 * M_PI, kLength, 4.0, paintBricks);
   b.level({kMiddle, -0.5, -0.4}, 0.0, kLength, 5.0,
           [](const Canvas& c) { return paintTiles(c, 0.5, 0.5); });
   b.density(400);
   for (double x = -6.5; x < kLength - 9.0; x += b.random().uniform(1.0, 1.7)) {
     const double w = b.random().uniform(0.5, 0.9), h = b.random().uniform(0.5, 0.95);
-    b.upright({x, 1.995, b.random().uniform(1.15, 1.9)}, -0.5 * kPi, w, h,
+    b.upright({x, 1.995, b.random().uniform(1.15, 1.9)}, -0.5 * M_PI, w, h,
               b.random().uniform() < 0.7 ? Paint(paintPoster) : Paint(paintCorkBoard));
   }
   b.lamp({kMiddle, -30, 30}, 1.0, 1900.0, {0.0, 1.0, -1.0});
-  b.start({0.0, 0.0, 1.5}, 0.5 * kPi, 0.0, {-1.0, -0.4, -0.5}, {12.0, 0.4, 0.6}, 1.0);
+  b.start({0.0, 0.0, 1.5}, 0.5 * M_PI, 0.0, {-1.0, -0.4, -0.5}, {12.0, 0.4, 0.6}, 1.0);
   return b.finish();
 }
 
@@ -76,7 +69,7 @@ Scene makeWalkway(std::uint64_t seed) {
   b.level({-7, 25, 0.002}, 0.0, 10.0, 60, paintGrass);
   b.level({7, 40, -0.01}, 0.0, 12.0, 100, paintGrass);
   b.upright({-5.0, 22, 4.5}, 0.0, 50, 9, paintFacade);
-  b.upright({4.6, 22, 1.2}, kPi, 50, 2.4, paintFoliage);
+  b.upright({4.6, 22, 1.2}, M_PI, 50, 2.4, paintFoliage);
   b.density(220);
   // A colonnade: the same pillar over and over.
   for (int i = 0; i < 12; ++i) {
@@ -95,7 +88,7 @@ Scene makeWalkway(std::uint64_t seed) {
   b.density(250);
   for (int i = 0; i < 4; ++i) b.upright({-4.99, 5.0 + 7.2 * i, 1.1}, 0.0, 1.1, 2.2, paintDoor);
   b.lamp({20, -12, 40}, 1.0, 1900.0, {-0.4, 0.4, -1.0});
-  b.start({0.0, 0.0, 1.6}, 0.5 * kPi, 0.0, {-0.8, -0.4, -0.6}, {0.8, 0.4, 22.0}, 1.3);
+  b.start({0.0, 0.0, 1.6}, 0.5 * M_PI, 0.0, {-0.8, -0.4, -0.6}, {0.8, 0.4, 22.0}, 1.3);
   return b.finish();
 }
 

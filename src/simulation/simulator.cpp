@@ -9,7 +9,6 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 /// Auto exposure: wanted mean of the image (1 = white), lag, and limits of the gain.
 constexpr double kTargetMean = 0.44;
 constexpr double kExposureLagS = 0.5;
@@ -82,8 +81,8 @@ Simulator::Simulator(const SimulatorOptions& options)
   for (Surface& surface : scene_.surfaces) surface.albedo.release();  // the renderer has its own
   Random random = Random(options.seed).fork(0x44524946);
   for (int i = 0; i < 3; ++i)
-    drift_.add(options.drift / 3.0, 2.0 * kPi * random.uniform(0.02, 0.25),
-               random.uniform(0.0, 2.0 * kPi));
+    drift_.add(options.drift / 3.0, 2.0 * M_PI * random.uniform(0.02, 0.25),
+               random.uniform(0.0, 2.0 * M_PI));
 }
 
 int Simulator::frameCount() const {

@@ -10,8 +10,6 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 cv::Mat blank(const Canvas& canvas, double level) {
   return cv::Mat(canvas.size(), CV_32FC1, cv::Scalar(level));
 }
@@ -36,8 +34,8 @@ void addStrokes(cv::Mat& image, const Canvas& c, double per_m2, double length_m,
   const int count = static_cast<int>(per_m2 * c.width_m * c.height_m);
   for (int i = 0; i < count; ++i) {
     const cv::Point2d from(random.uniform(0.0, image.cols), random.uniform(0.0, image.rows));
-    const double angle = vertical ? -0.5 * kPi + random.uniform(-0.5, 0.5) * spread
-                                  : random.uniform(0.0, 2.0 * kPi) * spread;
+    const double angle = vertical ? -0.5 * M_PI + random.uniform(-0.5, 0.5) * spread
+                                  : random.uniform(0.0, 2.0 * M_PI) * spread;
     const double length = length_m * c.texels_per_m * random.uniform(0.4, 1.3);
     const cv::Point to(cvRound(from.x + length * std::cos(angle)),
                        cvRound(from.y + length * std::sin(angle)));

@@ -17,12 +17,12 @@
 namespace active_matching_slam {
 namespace {
 
-struct SimulatedRun {
+struct StructureRun {
   std::string scene, motion;
   std::uint64_t seed = 1;
 };
 
-std::ostream& operator<<(std::ostream& out, const SimulatedRun& run) {
+std::ostream& operator<<(std::ostream& out, const StructureRun& run) {
   return out << run.scene << ", " << run.motion << ", seed " << run.seed;
 }
 
@@ -31,7 +31,7 @@ struct RenderedSequence {
   std::vector<SimulatedFrame> images;
 };
 
-RenderedSequence render(const SimulatedRun& run) {
+RenderedSequence render(const StructureRun& run) {
   SimulatorOptions simulation;
   simulation.scene = run.scene;
   simulation.motion = run.motion;
@@ -87,8 +87,8 @@ double naivePreserved(const TrackedFrame& frame, int submaps) {
   return preservedInformation(graphEdges(*frame.graph), naivePartition(features, submaps), submaps);
 }
 
-const std::vector<SimulatedRun>& twoDepthsRuns() {
-  static const std::vector<SimulatedRun> runs = {{"two_depths", "circle", 1},
+const std::vector<StructureRun>& twoDepthsRuns() {
+  static const std::vector<StructureRun> runs = {{"two_depths", "circle", 1},
                                                  {"two_depths", "slow", 1},
                                                  {"two_depths", "slow", 2},
                                                  {"two_depths", "sideways", 1}};
@@ -97,7 +97,7 @@ const std::vector<SimulatedRun>& twoDepthsRuns() {
 
 /// Cuts the map in two and expects table and wall to come apart, but for every tenth feature.
 /// Returns by how much more is preserved than by the naive halves.
-double expectTwoDepths(const SimulatedRun& run, const TrackedFrame& frame) {
+double expectTwoDepths(const StructureRun& run, const TrackedFrame& frame) {
   const SubmapPartition two = partitionIntoSubmaps(*frame.graph, *frame.submaps, 2);
   const double naive = naivePreserved(frame, 2);
   std::printf("%s: preserved %.3f, naive %.3f;", testing::PrintToString(run).c_str(), two.preserved,
@@ -120,7 +120,7 @@ TEST(TwoDepths, TheTableInFrontComesApartFromTheWallBehind) {
   shifting.filter.sigma_acceleration_mps2 = 4.0;
   shifting.filter.sigma_angular_acceleration_rps2 = 3.0;
   double margin_by_default = 0.0;  // mean over the runs
-  for (const SimulatedRun& run : twoDepthsRuns()) {
+  for (const StructureRun& run : twoDepthsRuns()) {
     SCOPED_TRACE(testing::PrintToString(run));
     const RenderedSequence sequence = render(run);
     const auto shifted = lastFrameOf(sequence, shifting, Unit::kMetric);
@@ -136,7 +136,7 @@ TEST(TwoDepths, TheTableInFrontComesApartFromTheWallBehind) {
   EXPECT_GT(margin_by_default, 0.25);
 }
 
-class RenderedStructure : public testing::TestWithParam<SimulatedRun> {};
+class RenderedStructure : public testing::TestWithParam<StructureRun> {};
 
 TEST_P(RenderedStructure, SubmapsPreserveMoreThanNaivePartsAtEveryLevel) {
   const auto frame = lastFrameOf(render(GetParam()), TrackerOptions(), Unit::kFree);
@@ -155,10 +155,10 @@ TEST_P(RenderedStructure, SubmapsPreserveMoreThanNaivePartsAtEveryLevel) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, RenderedStructure,
-                         testing::Values(SimulatedRun{"two_depths", "slow", 1},
-                                         SimulatedRun{"corridor", "forward", 1},
-                                         SimulatedRun{"wall", "sideways", 1},
-                                         SimulatedRun{"room", "slow", 1}));
+                         testing::Values(StructureRun{"two_depths", "slow", 1},
+                                         StructureRun{"corridor", "forward", 1},
+                                         StructureRun{"wall", "sideways", 1},
+                                         StructureRun{"room", "slow", 1}));
 
 // Table 6.1, sideways, four submaps: 93.8 % against 74.7 %. The margins of its finer partitions
 // (ten submaps: 0.24) and of its forward sequence (three and 18 submaps: 0.11) are not met here.

@@ -9,18 +9,10 @@
 
 #include "active_matching_slam/camera/camera_model.h"
 #include "camera/test_calibrations.h"
+#include "support/fault.h"
 
 namespace active_matching_slam {
 namespace {
-
-std::string faultOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
-}
 
 std::string faultAfter(const std::function<void(CameraCalibration*)>& damage,
                        DistortionModel model = DistortionModel::kPlumbBob) {

@@ -10,6 +10,7 @@
 
 #include "active_matching_slam/evaluation/text_file.h"
 #include "evaluation/test_trajectories.h"
+#include "support/fault.h"
 
 namespace active_matching_slam {
 namespace {

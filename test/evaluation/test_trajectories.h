@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <functional>
 #include <random>
 #include <string>
 
@@ -46,15 +45,6 @@ inline Eigen::Matrix3d someRotation() {
 
 inline std::string temporaryPath(const std::string& name) {
   return "/tmp/ams_evaluation_" + std::to_string(getpid()) + "_" + name;
-}
-
-inline std::string faultOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
 }
 
 }  // namespace active_matching_slam

@@ -7,6 +7,7 @@
 
 #include "active_matching_slam/evaluation/plot_canvas.h"
 #include "evaluation/test_trajectories.h"
+#include "support/fault.h"
 
 namespace active_matching_slam {
 namespace {

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "evaluation/test_trajectories.h"
+#include "support/fault.h"
 
 namespace active_matching_slam {
 namespace {

@@ -10,10 +10,6 @@
 namespace active_matching_slam {
 namespace {
 
-Template cutTemplate(const cv::Mat& image, int u, int v, int size) {
-  return *makeTemplate(image(cv::Rect(u - size / 2, v - size / 2, size, size)));
-}
-
 std::vector<PixelRun> allPositions(const cv::Mat& image, int size) {
   std::vector<PixelRun> runs;
   for (int v = size / 2; v < image.rows - size / 2; ++v)

@@ -20,10 +20,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Template cutTemplate(const cv::Mat& image, int u, int v, int size = 11) {
-  return *makeTemplate(image(cv::Rect(u - size / 2, v - size / 2, size, size)));
-}
-
 SearchEllipse round(double u, double v, double sigma) {
   return {{u, v}, sigma * sigma * Eigen::Matrix2d::Identity()};
 }

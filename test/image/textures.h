@@ -6,6 +6,8 @@
 #include <random>
 #include <vector>
 
+#include "active_matching_slam/image/template.h"
+
 namespace active_matching_slam {
 
 /// A grey texture known everywhere exactly: a sum of waves of random direction and phase.
@@ -59,6 +61,11 @@ inline cv::Mat randomImage(int width, int height, unsigned seed, int low = 0, in
       image.at<std::uint8_t>(v, u) =
           static_cast<std::uint8_t>(low + generator() % (high - low + 1u));
   return image;
+}
+
+/// The `size` x `size` pixels around (u, v).
+inline Template cutTemplate(const cv::Mat& image, int u, int v, int size = 11) {
+  return *makeTemplate(image(cv::Rect(u - size / 2, v - size / 2, size, size)));
 }
 
 /// Adds Gaussian noise of standard deviation `sigma` grey levels.

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "active_matching_slam/ros/reconfigure_server.h"
+#include "support/fault.h"
 
 namespace active_matching_slam {
 namespace {
@@ -23,16 +24,6 @@ struct Settings {
     throw std::out_of_range(name);
   }
 };
-
-template <class Call>
-std::string faultOf(Call call) {
-  try {
-    call();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "no fault";
-}
 
 TEST(Parameters, AreTakenFromTheTree) {
   Settings settings;

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "ros/world_header.h"
+
 namespace active_matching_slam {
 namespace {
 
@@ -23,13 +25,6 @@ TrackedFeature matchedFeature(FeatureId id) {
   feature.innovation_covariance_px2 << 3, 1, 1, 5;
   feature.matched_px << 11, 21;
   return feature;
-}
-
-std_msgs::Header worldHeader() {
-  std_msgs::Header header;
-  header.frame_id = "world";
-  header.stamp = ros::Time(3, 4);
-  return header;
 }
 
 TEST(FeatureMessage, HoldsWhatTheFeatureIs) {

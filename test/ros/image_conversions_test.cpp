@@ -8,6 +8,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "support/fault.h"
 #include "support/fuzz.h"
 
 namespace active_matching_slam {
@@ -31,16 +32,6 @@ sensor_msgs::CameraInfo makeInfo() {
   info.D = {0.1, -0.2, 0.001, 0.002, 0.05};
   info.K = {500, 0, 321, 0, 510, 243, 0, 0, 1};
   return info;
-}
-
-template <class Call>
-std::string faultOf(Call call) {
-  try {
-    call();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "no fault";
 }
 
 /// A smooth picture: demosaicking may blur it, but must leave its brightness where it is.
@@ -113,7 +104,7 @@ TEST(ImageConversions, BrokenImagesAreNamedAndNeverRead) {
   bad = good;
   bad.height = 0xffffffffu;
   bad.step = 0xffffffffu;
-  EXPECT_NE("no fault", faultOf([&] { toGrayImage(bad); }));
+  EXPECT_NE("", faultOf([&] { toGrayImage(bad); }));
 }
 
 TEST(ImageConversions, CompressedImagesAreDecodedOrNamed) {
@@ -124,7 +115,7 @@ TEST(ImageConversions, CompressedImagesAreDecodedOrNamed) {
   message.data.resize(20);
   EXPECT_NE(std::string::npos, faultOf([&] { toGrayImage(message); }).find("can't be decoded"));
   message.data.clear();
-  EXPECT_NE("no fault", faultOf([&] { toGrayImage(message); }));
+  EXPECT_NE("", faultOf([&] { toGrayImage(message); }));
 }
 
 TEST(CameraInfo, BecomesTheCalibrationOfTheRawImage) {
@@ -179,10 +170,10 @@ TEST(CameraInfo, AnUncalibratedCameraIsNamed) {
   EXPECT_NE(std::string::npos, faultOf([&] { toCalibration(info); }).find("uncalibrated"));
   info = makeInfo();
   info.K[0] = std::nan("");
-  EXPECT_NE("no fault", faultOf([&] { toCalibration(info); }));
+  EXPECT_NE("", faultOf([&] { toCalibration(info); }));
   info = makeInfo();
   info.width = 0;
-  EXPECT_NE("no fault", faultOf([&] { toCalibration(info); }));
+  EXPECT_NE("", faultOf([&] { toCalibration(info); }));
 }
 
 TEST(CameraInfo, NoNumbersWhateverDoMoreThanBeRefused) {

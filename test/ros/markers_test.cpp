@@ -9,19 +9,13 @@
 #include "active_matching_slam/ros/link_view.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 #include "ros/point_feature.h"
+#include "ros/world_header.h"
 
 namespace active_matching_slam {
 namespace {
 
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
-
-std_msgs::Header worldHeader() {
-  std_msgs::Header header;
-  header.frame_id = "world";
-  header.stamp = ros::Time(5, 6);
-  return header;
-}
 
 const Marker* find(const MarkerArray& markers, const std::string& ns, int id) {
   for (const Marker& marker : markers.markers)
@@ -70,7 +64,7 @@ TEST(FeatureMarkers, PointsGetEllipsoidsOfFullThreeSigmaLength) {
   EXPECT_NEAR(0.12, lengths[1], 1e-9);
   EXPECT_NEAR(0.18, lengths[2], 1e-9);
   EXPECT_EQ("world", ellipsoid->header.frame_id);
-  EXPECT_EQ(ros::Time(5, 6), ellipsoid->header.stamp);
+  EXPECT_EQ(worldHeader().stamp, ellipsoid->header.stamp);
 }
 
 TEST(FeatureMarkers, InverseDepthFeaturesAreTheirRay) {
