@@ -55,6 +55,7 @@ class Tracker::Implementation {
   std::optional<MeasurementPrior> guidedPrior(const cv::Mat& image) const;
   MatchOptions partOfBudget(double share) const;
   double expectedOf(const MatchStatistics& s) const;
+  bool isByChance(const MatchResult& result, double expected) const;
   void match(const cv::Mat& image, TrackedFrame* frame);
   void correct(TrackedFrame* frame);
   void judge();
@@ -66,7 +67,12 @@ class Tracker::Implementation {
   void updateStructure(TrackedFrame* frame);
   int startFeatures(const cv::Mat& image, int wanted, TrackedFrame* frame);
   void retire(const std::vector<FeatureId>& ids, TrackedFrame* frame);
-  double depthPrior() const;
+  struct DepthSample {
+    Eigen::Vector3d bearing_camera;
+    double inverse_depth;
+  };
+  std::vector<DepthSample> knownDepths() const;
+  double depthPrior(const Eigen::Vector2d& pixel, std::vector<DepthSample> known) const;
   void describe(TrackedFrame* frame) const;
 
   CameraModel camera_;

@@ -65,10 +65,9 @@ void Tracker::Implementation::updateStructure(TrackedFrame* frame) {
   frame->submaps = structure_snapshot_.submaps;
 }
 
-/// Median inverse depth of what is seen now, so that new features say nothing new about scale; the
-/// options' prior while nothing is known.
-double Tracker::Implementation::depthPrior() const {
-  std::vector<double> inverse_depths;
+/// Direction and inverse depth, in the camera, of what is seen now and of known depth.
+std::vector<Tracker::Implementation::DepthSample> Tracker::Implementation::knownDepths() const {
+  std::vector<DepthSample> known;
   const Eigen::Isometry3d T_camera_world = filter_.camera().poseWorldCamera().inverse();
   for (const VisibleFeature& feature : visible_) {
     const FeatureState* state = filter_.find(feature.id);
@@ -76,13 +75,27 @@ double Tracker::Implementation::depthPrior() const {
     if (state->kind == FeatureKind::kInverseDepth &&
         filter_.sigmaInverseDepth(*state) > 0.2 * state->inverse_depth)
       continue;
-    inverse_depths.push_back(1.0 / (T_camera_world * state->position()).norm());
+    const Eigen::Vector3d point = T_camera_world * state->position();
+    known.push_back({point.normalized(), 1.0 / point.norm()});
   }
-  if (inverse_depths.size() < 5) return options_.filter.initial_inverse_depth;
-  const auto middle =
-      inverse_depths.begin() + static_cast<std::ptrdiff_t>(inverse_depths.size() / 2);
-  std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
-  return *middle;
+  return known;
+}
+
+/// Median inverse depth of the neighbours of a new feature, so that it says nothing new about
+/// scale, near something and far from it alike; the options' prior while nothing is known.
+double Tracker::Implementation::depthPrior(const Eigen::Vector2d& pixel,
+                                           std::vector<DepthSample> known) const {
+  constexpr std::ptrdiff_t kNeighbours = 5;
+  const auto ray = camera_.unproject(pixel);
+  if (!ray || known.size() < kNeighbours) return options_.filter.initial_inverse_depth;
+  std::nth_element(known.begin(), known.begin() + (kNeighbours - 1), known.end(),
+                   [&ray](const DepthSample& a, const DepthSample& b) {
+                     return a.bearing_camera.dot(*ray) > b.bearing_camera.dot(*ray);
+                   });
+  std::nth_element(
+      known.begin(), known.begin() + kNeighbours / 2, known.begin() + kNeighbours,
+      [](const DepthSample& a, const DepthSample& b) { return a.inverse_depth < b.inverse_depth; });
+  return known[kNeighbours / 2].inverse_depth;
 }
 
 int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, TrackedFrame* frame) {
@@ -97,9 +110,9 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
                                        point.w() * T_camera_world.translation());
     if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
   }
-  const double inverse_depth = depthPrior();
-  const double sigma = inverse_depth * options_.filter.initial_sigma_inverse_depth /
-                       options_.filter.initial_inverse_depth;
+  const std::vector<DepthSample> known_depths = knownDepths();
+  const double relative_sigma =
+      options_.filter.initial_sigma_inverse_depth / options_.filter.initial_inverse_depth;
   int started = 0;
   std::vector<FeatureMeasurement> first_sights;
   for (const Corner& corner :
@@ -107,8 +120,10 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
     auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
                                     options_.image.source_patch_size_px);
     if (!patch) continue;
+    const double inverse_depth = depthPrior(corner.pixel, known_depths);
     MapFeature feature;
-    feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth, sigma);
+    feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
+                                                relative_sigma * inverse_depth);
     if (feature.id < 0) continue;
     first_sights.push_back({feature.id, corner.pixel, 0.0});
     feature.patch = std::move(*patch);

@@ -4,6 +4,7 @@
 #include "active_matching_slam/image/image_motion.h"
 #include "active_matching_slam/image/warp.h"
 #include "active_matching_slam/information/gaussian_information.h"
+#include "active_matching_slam/tracker/chance_check.h"
 #include "active_matching_slam/tracker/image_motion_prior.h"
 #include "active_matching_slam/tracker/innovation_check.h"
 #include "tracker_implementation.h"
@@ -24,6 +25,7 @@ constexpr double kClearlyMore = 1.25;      ///< matches, for RANSAC's to count
 constexpr double kFirstShare = 0.6;        ///< of the budget, for the first attempt
 constexpr double kShareOfRest = 0.5;       ///< for each opinion but the last, which has it all
 constexpr double kAgreementChi2 = 13.8;    ///< 99.9 % of 2 degrees of freedom
+constexpr double kMostLogFalseAlarms = -1.0;
 /// Pixels in all ellipses together beyond which the image's motion guides the first attempt.
 constexpr double kWideGatesPx = 2e5;
 
@@ -136,6 +138,19 @@ double Tracker::Implementation::expectedOf(const MatchStatistics& s) const {
   return map_.expectedMatches(is_crowded ? candidates_ : searched);
 }
 
+/// Whether as many matches agree by accident, among all that were met. In the first images depths
+/// are so vague that matches leave each other most of their gates: only very few count for nothing.
+bool Tracker::Implementation::isByChance(const MatchResult& result, double expected) const {
+  if (start_adjustment_.isActive()) return result.statistics.matched < kLeastShare * expected;
+  if (result.statistics.matched >= kMajority * expectedOf(result.statistics)) return false;
+  std::vector<int> matches, accepted;
+  for (int i = 0; i < prior_.size(); ++i) {
+    matches.push_back(static_cast<int>(search_.matches(i).size()));
+    if (result.match_of_feature[i] >= 0) accepted.push_back(i);
+  }
+  return logFalseAlarms(prior_.S, matches, accepted) > kMostLogFalseAlarms;
+}
+
 /// A slower camera, or a gap, leaves more time: the budget is meant for 30 Hz.
 MatchOptions Tracker::Implementation::partOfBudget(double share) const {
   MatchOptions options = options_.matching;
@@ -156,6 +171,9 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
 ///   if it agrees far better than it must.
 /// - A sequential matcher that follows something that moves by itself (a hand, a door) first, can
 ///   end up with that and little else: RANSAC.
+/// What is then still less than half of what should match counts only if it is no accident: a few
+/// matches that agree by chance in a blurred image throw the camera off, where none would let it
+/// wait for the next image.
 void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   if (!options_.second_opinion) {
     frame->matching = matcher_->match(prior_, search_, partOfBudget(1.0));
@@ -196,7 +214,7 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
              kFarChi2PerDegree, frame);
   }
   MatchResult& result = frame->matching;
-  if (result.statistics.matched >= kLeastShare * expected) return;
+  if (!isByChance(result, expected)) return;
   std::fill(result.match_of_feature.begin(), result.match_of_feature.end(), -1);
   result.statistics.matched = 0;
 }

@@ -98,15 +98,22 @@ TEST_F(RecordedSequences, KitchenIsTracked) {
 TEST_F(RecordedSequences, KitchenIsTrackedWithinTheBudgetOfASlowMachine) {
   // A clock that ticks whenever it is read. Ambiguous frames ask for 800 searches of the 60
   // features; a fifth of the frames is cut short at the first speed and four fifths at the second.
-  for (const double tick_s : {20e-6, 30e-6}) {
+  // At 15 Hz half of the features and more are lost in blur around image 740.
+  struct Case {
+    int every;
+    double tick_s;
+  };
+  for (const Case& c : {Case{1, 25e-6}, Case{1, 30e-6}, Case{2, 20e-6}}) {
+    SCOPED_TRACE(testing::Message() << "every " << c.every << ", " << c.tick_s << " s a tick");
     TrackerOptions options;
     options.matching.max_milliseconds = 20.0;
-    options.matching.clock_s = [now_s = 0.0, tick_s]() mutable { return now_s += tick_s; };
-    const TrackedRun run = trackAll("sevenscenes_redkitchen", 1, options, false);
-    EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames) << tick_s;
-    EXPECT_GE(run.cut_short, run.frames / 5) << tick_s;
-    EXPECT_LE(errorMm(run, "sevenscenes_redkitchen", AlignmentKind::kSimilarity), kKitchenMm)
-        << tick_s;
+    options.matching.clock_s = [now_s = 0.0, tick_s = c.tick_s]() mutable {
+      return now_s += tick_s;
+    };
+    const TrackedRun run = trackAll("sevenscenes_redkitchen", c.every, options, false);
+    EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
+    EXPECT_GE(run.cut_short, run.frames / 5);
+    EXPECT_LE(errorMm(run, "sevenscenes_redkitchen", AlignmentKind::kSimilarity), kKitchenMm);
   }
 }
 
