@@ -155,8 +155,58 @@ std::optional<Eigen::Vector2d> CameraModel::project(
     d_pixel_d_point->leftCols<2>() = jacobian;
     d_pixel_d_point->col(2) = -jacobian * ideal;
   }
-  return Eigen::Vector2d(calibration_.fx * distorted.x() + calibration_.cx,
-                         calibration_.fy * distorted.y() + calibration_.cy);
+  const Eigen::Vector2d pixel(calibration_.fx * distorted.x() + calibration_.cx,
+                              calibration_.fy * distorted.y() + calibration_.cy);
+  Eigen::Matrix2d d_corrected;
+  const Eigen::Vector2d corrected = correct(pixel, &d_corrected);
+  if (!(d_corrected.determinant() > 0.0 && d_corrected.trace() > 0.0)) return std::nullopt;
+  if (d_pixel_d_point) *d_pixel_d_point = d_corrected * *d_pixel_d_point;
+  return corrected;
+}
+
+CameraModel CameraModel::corrected(const LensCorrection& correction) const {
+  CameraModel camera = *this;
+  camera.correction_ = correction;
+  return camera;
+}
+
+Eigen::Vector2d CameraModel::correct(const Eigen::Vector2d& pixel,
+                                     Eigen::Matrix2d* jacobian) const {
+  const Eigen::Vector2d centre(calibration_.cx, calibration_.cy);
+  const Eigen::Vector2d offset = pixel - centre;
+  const Eigen::Vector2d n(offset.x() / calibration_.fx, offset.y() / calibration_.fy);
+  const double scale = 1.0 + correction_.focal + correction_.radial * n.squaredNorm();
+  if (jacobian) {
+    const Eigen::RowVector2d d_scale(2.0 * correction_.radial * n.x() / calibration_.fx,
+                                     2.0 * correction_.radial * n.y() / calibration_.fy);
+    *jacobian = scale * Eigen::Matrix2d::Identity() + offset * d_scale;
+  }
+  return centre + correction_.centre_px + scale * offset;
+}
+
+std::optional<Eigen::Vector2d> CameraModel::uncorrect(const Eigen::Vector2d& pixel) const {
+  Eigen::Vector2d solution = pixel - correction_.centre_px;
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    Eigen::Matrix2d jacobian;
+    const Eigen::Vector2d residual = correct(solution, &jacobian) - pixel;
+    if (!(jacobian.determinant() > 0.0)) return std::nullopt;
+    if (residual.cwiseAbs().maxCoeff() <= 1e-12 * (1.0 + pixel.cwiseAbs().maxCoeff()))
+      return solution;
+    solution -= jacobian.inverse() * residual;
+  }
+  return std::nullopt;
+}
+
+Eigen::Matrix<double, 2, 4> CameraModel::pixelByCorrection(const Eigen::Vector2d& pixel) const {
+  Eigen::Matrix<double, 2, 4> J = Eigen::Matrix<double, 2, 4>::Zero();
+  J.rightCols<2>().setIdentity();
+  if (const auto plain = uncorrect(pixel)) {
+    const Eigen::Vector2d offset = *plain - Eigen::Vector2d(calibration_.cx, calibration_.cy);
+    J.col(0) = offset;
+    J.col(1) = offset * (std::pow(offset.x() / calibration_.fx, 2) +
+                         std::pow(offset.y() / calibration_.fy, 2));
+  }
+  return J;
 }
 
 std::optional<double> CameraModel::undistortRadius(double distorted_radius) const {
@@ -213,8 +263,10 @@ std::optional<Eigen::Vector2d> CameraModel::undistort(const Eigen::Vector2d& dis
 
 std::optional<Eigen::Vector3d> CameraModel::unproject(
     const Eigen::Vector2d& pixel, Eigen::Matrix<double, 3, 2>* d_bearing_d_pixel) const {
-  const Eigen::Vector2d distorted((pixel.x() - calibration_.cx) / calibration_.fx,
-                                  (pixel.y() - calibration_.cy) / calibration_.fy);
+  const auto plain = uncorrect(pixel);
+  if (!plain) return std::nullopt;
+  const Eigen::Vector2d distorted((plain->x() - calibration_.cx) / calibration_.fx,
+                                  (plain->y() - calibration_.cy) / calibration_.fy);
   const std::optional<Eigen::Vector2d> ideal = undistort(distorted);
   if (!ideal || !(ideal->squaredNorm() <= max_radius2_)) return std::nullopt;
   const double inverse_norm = 1.0 / std::sqrt(ideal->squaredNorm() + 1.0);
@@ -228,7 +280,9 @@ std::optional<Eigen::Vector3d> CameraModel::unproject(
     Eigen::Matrix<double, 3, 2> d_bearing_d_ideal = -bearing * bearing.head<2>().transpose();
     d_bearing_d_ideal(0, 0) += 1.0;
     d_bearing_d_ideal(1, 1) += 1.0;
-    *d_bearing_d_pixel = inverse_norm * d_bearing_d_ideal * d_ideal_d_pixel;
+    Eigen::Matrix2d d_corrected;
+    correct(*plain, &d_corrected);
+    *d_bearing_d_pixel = inverse_norm * d_bearing_d_ideal * d_ideal_d_pixel * d_corrected.inverse();
   }
   return bearing;
 }

@@ -20,14 +20,20 @@ constexpr double kLeastInformation = 1e-2;
 using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
-/// Least squares over (cameras but the first, 6 each; features, 3 each) about the present state.
+constexpr int kCalibrationSize = CameraError::kCalibrationSize;
+constexpr int kLensSize = kCalibrationSize - 1;  ///< all but the readout
+using LensVector = Eigen::Matrix<double, kLensSize, 1>;
+constexpr double kLeastSigmaCalibration = 1e-8;  ///< of what is beyond doubt
+
+/// Least squares over (cameras but the first, 6 each, and the calibration; features, 3 each) about
+/// the present state. C = 6K + kCalibrationSize.
 struct NormalEquations {
   double cost = 0.0;
-  Eigen::MatrixXd cameras;                ///< 6K x 6K, block diagonal
-  Eigen::VectorXd camera_gradient;        ///< 6K
+  Eigen::MatrixXd cameras;                ///< C x C
+  Eigen::VectorXd camera_gradient;        ///< C
   std::vector<Eigen::Matrix3d> features;  ///< F blocks
   Eigen::VectorXd feature_gradient;       ///< 3F
-  Eigen::MatrixXd cross;                  ///< 6K x 3F, cameras by features
+  Eigen::MatrixXd cross;                  ///< C x 3F
 };
 
 /// Cauchy's function of a squared residual [px^2], in units of the noise: what is far off counts
@@ -43,8 +49,18 @@ double robustInformation(const BundleOptions& options, double squared) {
          (1.0 + squared / (options.outlier_px * options.outlier_px));
 }
 
+/// Where a point would be seen by the calibration as given.
+Eigen::Vector2d plainPixel(const Bundle& bundle, const BundleObservation& o) {
+  return o.pixel - o.d_calibration * bundle.calibration;
+}
+
+CalibrationVector calibrationInformation(const BundleOptions& options) {
+  return options.sigma_calibration.cwiseMax(kLeastSigmaCalibration).array().square().inverse();
+}
+
 double bundleCost(const CameraModel& model, const BundleOptions& options, const Bundle& bundle) {
-  double cost = 0.0;
+  double cost =
+      bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
   for (const FeatureState& feature : bundle.features)
     cost +=
         std::pow((feature.inverse_depth - options.inverse_depth) / options.sigma_inverse_depth, 2);
@@ -55,7 +71,8 @@ double bundleCost(const CameraModel& model, const BundleOptions& options, const 
       const FeatureState& feature = bundle.features[o.feature];
       const auto pixel = model.project(
           R_camera_world * (feature.bearing_world - feature.inverse_depth * camera.position_world));
-      cost += pixel ? robustCost(options, (o.pixel - *pixel).squaredNorm()) : kCostOfInvisible;
+      cost += pixel ? robustCost(options, (plainPixel(bundle, o) - *pixel).squaredNorm())
+                    : kCostOfInvisible;
     }
   }
   return cost;
@@ -66,11 +83,17 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
   const int K = static_cast<int>(bundle.cameras.size()) - 1;
   const int F = static_cast<int>(bundle.features.size());
   NormalEquations N;
-  N.cameras = Eigen::MatrixXd::Zero(6 * K, 6 * K);
-  N.camera_gradient = Eigen::VectorXd::Zero(6 * K);
+  const int C = 6 * K + kCalibrationSize;
+  N.cameras = Eigen::MatrixXd::Zero(C, C);
+  N.camera_gradient = Eigen::VectorXd::Zero(C);
   N.features.assign(F, Eigen::Vector3d(kLeastInformation, kLeastInformation, 0.0).asDiagonal());
   N.feature_gradient = Eigen::VectorXd::Zero(3 * F);
-  N.cross = Eigen::MatrixXd::Zero(6 * K, 3 * F);
+  N.cross = Eigen::MatrixXd::Zero(C, 3 * F);
+  const CalibrationVector information = calibrationInformation(options);
+  const CalibrationVector pull = information.cwiseProduct(bundle.calibration);
+  N.cameras.diagonal().tail<kCalibrationSize>() = information;
+  N.camera_gradient.tail<kCalibrationSize>() = -pull;
+  N.cost += bundle.calibration.dot(pull);
   for (int i = 0; i < F; ++i) {
     const double weight = 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
     const double error = options.inverse_depth - bundle.features[i].inverse_depth;
@@ -79,23 +102,32 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
     N.cost += weight * error * error;
   }
   for (int k = 0; k <= K; ++k) {
+    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
     for (const BundleObservation& o : bundle.observations[k]) {
-      const auto projection = projectFeature(model, bundle.cameras[k], bundle.features[o.feature]);
+      Matrix26 d_pose;
+      const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
+                                              bundle.features[o.feature], &d_pose);
       if (!projection) {
         N.cost += kCostOfInvisible;
         continue;
       }
-      const Eigen::Vector2d residual = o.pixel - projection->pixel;
+      const Eigen::Vector2d residual = plainPixel(bundle, o) - projection->pixel;
       const double weight = robustInformation(options, residual.squaredNorm());
       N.cost += robustCost(options, residual.squaredNorm());
       const Matrix23 J = projection->d_feature.rightCols<3>();
       N.features[o.feature] += weight * J.transpose() * J;
       N.feature_gradient.segment<3>(3 * o.feature) += weight * J.transpose() * residual;
+      const auto& D = o.d_calibration;
+      N.cameras.bottomRightCorner<kCalibrationSize, kCalibrationSize>() +=
+          weight * D.transpose() * D;
+      N.camera_gradient.tail<kCalibrationSize>() += weight * D.transpose() * residual;
+      N.cross.block<kCalibrationSize, 3>(6 * K, 3 * o.feature) += weight * D.transpose() * J;
       if (k == 0) continue;
-      const Matrix26& C = projection->d_camera;
-      N.cameras.block<6, 6>(6 * (k - 1), 6 * (k - 1)) += weight * C.transpose() * C;
-      N.camera_gradient.segment<6>(6 * (k - 1)) += weight * C.transpose() * residual;
-      N.cross.block<6, 3>(6 * (k - 1), 3 * o.feature) = weight * C.transpose() * J;
+      const int row = 6 * (k - 1);
+      N.cameras.block<6, 6>(row, row) += weight * d_pose.transpose() * d_pose;
+      N.cameras.block<kCalibrationSize, 6>(6 * K, row) += weight * D.transpose() * d_pose;
+      N.camera_gradient.segment<6>(row) += weight * d_pose.transpose() * residual;
+      N.cross.block<6, 3>(row, 3 * o.feature) = weight * d_pose.transpose() * J;
     }
   }
   return N;
@@ -103,13 +135,15 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
 
 /// The normal equations of the cameras alone, once the features are eliminated.
 struct CameraEquations {
-  Eigen::LLT<Eigen::MatrixXd> factor;          ///< 6K x 6K
+  Eigen::LLT<Eigen::MatrixXd> factor;          ///< C x C
   Eigen::MatrixXd cross;                       ///< W L^-T, where H = L L^T is a feature's block
   std::vector<Eigen::Matrix3d> inverse_roots;  ///< L^-1 of each feature
 };
 
-/// With the diagonal grown by `damping`. Empty when not positive definite.
-std::optional<CameraEquations> eliminateFeatures(const NormalEquations& N, double damping) {
+/// With the diagonal grown by `damping`. Empty when not positive definite. Given
+/// `lens_information`, that is all that is known of the lens once the rest is eliminated.
+std::optional<CameraEquations> eliminateFeatures(const NormalEquations& N, double damping,
+                                                 const LensVector* lens_information = nullptr) {
   CameraEquations reduced;
   reduced.cross.resize(N.cross.rows(), N.cross.cols());
   reduced.inverse_roots.reserve(N.features.size());
@@ -126,6 +160,13 @@ std::optional<CameraEquations> eliminateFeatures(const NormalEquations& N, doubl
   Eigen::MatrixXd S = N.cameras;
   S.diagonal() *= 1.0 + damping;
   S.selfadjointView<Eigen::Lower>().rankUpdate(reduced.cross, -1.0);
+  if (lens_information != nullptr) {
+    const Eigen::Index rest = S.rows() - kLensSize;
+    const Eigen::MatrixXd cross = S.bottomLeftCorner(kLensSize, rest);
+    const Eigen::LLT<Eigen::MatrixXd> others(S.topLeftCorner(rest, rest));
+    S.bottomRightCorner<kLensSize, kLensSize>() = cross * others.solve(cross.transpose());
+    S.diagonal().tail<kLensSize>() += *lens_information;
+  }
   reduced.factor.compute(S);  // reads the lower triangle
   if (reduced.factor.info() != Eigen::Success) return std::nullopt;
   return reduced;
@@ -159,6 +200,7 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
     camera.q_world_camera =
         (rotationFromVector(step.tail<3>()) * camera.q_world_camera).normalized();
   }
+  bundle->calibration += cameras.tail<kCalibrationSize>();
   for (std::size_t i = 0; i < bundle->features.size(); ++i) {
     FeatureState& feature = bundle->features[i];
     const auto step = features.segment<3>(static_cast<Eigen::Index>(3 * i));
@@ -205,7 +247,8 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
                                  const Bundle& bundle, int first_camera,
                                  double relative_scale_sigma) {
   const NormalEquations N = linearise(model, options, bundle);
-  const auto reduced = eliminateFeatures(N, 0.0);
+  const LensVector lens_information = calibrationInformation(options).tail<kLensSize>();
+  const auto reduced = eliminateFeatures(N, 0.0, &lens_information);
   if (!reduced) return {};
   const int cameras = static_cast<int>(N.cameras.rows()), kept = cameras - 6 * (first_camera - 1);
   const int F = static_cast<int>(N.features.size());
@@ -236,10 +279,13 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle) {
   std::vector<double> squares(bundle.features.size(), 0.0), counts(bundle.features.size(), 0.0);
   for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
+    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
     for (const BundleObservation& o : bundle.observations[k]) {
-      const auto projection = projectFeature(model, bundle.cameras[k], bundle.features[o.feature]);
+      Matrix26 d_pose;
+      const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
+                                              bundle.features[o.feature], &d_pose);
       if (!projection) continue;
-      squares[o.feature] += 0.5 * (o.pixel - projection->pixel).squaredNorm();
+      squares[o.feature] += 0.5 * (plainPixel(bundle, o) - projection->pixel).squaredNorm();
       counts[o.feature] += 1.0;
     }
   }

@@ -27,7 +27,10 @@ void Ekf::reset(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& 
   camera_.q_world_camera.normalize();
   features_.clear();
   covariance_.reset(CameraError::kSize);
-  covariance_.view() = 0.5 * (covariance + covariance.transpose());
+  auto P = covariance_.view();
+  P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() =
+      0.5 * (covariance + covariance.transpose());
+  P.diagonal().tail<CameraError::kCalibrationSize>() = calibrationSigmas(options_).array().square();
 }
 
 void Ekf::predict(double interval_s) {
@@ -39,9 +42,9 @@ void Ekf::predict(double interval_s) {
   camera_.position_world += camera_.velocity_world * interval_s;
   camera_.q_world_camera = (camera_.q_world_camera * rotationFromVector(turn)).normalized();
 
-  // P <- F P F^T touches the camera's rows and columns only.
+  // P <- F P F^T touches the motion's rows and columns only.
   auto P = covariance_.view();
-  const int map_size = covariance_.size() - CameraError::kSize;
+  const int rest = covariance_.size() - CameraError::kMotionSize;
   Eigen::Matrix<double, 12, 12> F = Eigen::Matrix<double, 12, 12>::Identity();
   F.block<3, 3>(CameraError::kPosition, CameraError::kVelocity) =
       interval_s * Eigen::Matrix3d::Identity();
@@ -58,14 +61,14 @@ void Ekf::predict(double interval_s) {
   predicted += G * variance.asDiagonal() * G.transpose();
   P_camera = 0.5 * (predicted + predicted.transpose());
 
-  auto camera_map = P.topRightCorner(CameraError::kSize, map_size);
-  for (int j = 0; j < map_size; ++j) {
-    camera_map.col(j).segment<3>(CameraError::kPosition) +=
-        interval_s * camera_map.col(j).segment<3>(CameraError::kVelocity);
-    camera_map.col(j).segment<3>(CameraError::kRotation) +=
-        K * camera_map.col(j).segment<3>(CameraError::kAngularVelocity);
+  auto motion_rest = P.topRightCorner(CameraError::kMotionSize, rest);
+  for (int j = 0; j < rest; ++j) {
+    motion_rest.col(j).segment<3>(CameraError::kPosition) +=
+        interval_s * motion_rest.col(j).segment<3>(CameraError::kVelocity);
+    motion_rest.col(j).segment<3>(CameraError::kRotation) +=
+        K * motion_rest.col(j).segment<3>(CameraError::kAngularVelocity);
   }
-  P.bottomLeftCorner(map_size, CameraError::kSize) = camera_map.transpose();
+  P.bottomLeftCorner(rest, CameraError::kMotionSize) = motion_rest.transpose();
 }
 
 void Ekf::rescale(double factor) {

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/rotation.h"
 #include "active_matching_slam/filter/state_error.h"
 
@@ -52,12 +53,14 @@ FeatureId Ekf::addInverseDepthFeature(const CameraModel& camera, const Eigen::Ve
                                       double inverse_depth, double sigma_inverse_depth) {
   if (!pixel.allFinite()) return -1;
   Eigen::Matrix<double, 3, 2> d_bearing_d_pixel;
-  const auto bearing = camera.unproject(pixel, &d_bearing_d_pixel);
+  const CameraModel lens = camera.corrected(camera_.lens);
+  const auto bearing = lens.unproject(pixel, &d_bearing_d_pixel);
   if (!bearing || !bearing->allFinite() || !d_bearing_d_pixel.allFinite()) return -1;
 
   FeatureState& feature = appendFeature(FeatureKind::kInverseDepth);
-  const Eigen::Matrix3d R = camera_.q_world_camera.toRotationMatrix();
-  feature.anchor_world = camera_.position_world;
+  const RowPose row = poseOfRow(camera, camera_, pixel.y());
+  const Eigen::Matrix3d& R = row.R_world_camera;
+  feature.anchor_world = row.position_world;
   feature.bearing_world = (R * *bearing).normalized();
   const Eigen::Vector3d axis = R.col(std::abs(bearing->x()) < 0.9 ? 0 : 1);
   feature.tangent_world =
@@ -66,22 +69,29 @@ FeatureId Ekf::addInverseDepthFeature(const CameraModel& camera, const Eigen::Ve
   const double sigma_rho =
       sigma_inverse_depth > 0.0 ? sigma_inverse_depth : options_.initial_sigma_inverse_depth;
 
-  // The anchor is the camera's place, the bearing turns with the camera; only the pixel's noise and
-  // the depth are new.
+  // The anchor is the camera's place, the bearing turns with the camera and goes with the lens;
+  // only the pixel's noise and the depth are new.
+  const Eigen::Matrix<double, 2, 2> d_error_d_pixel =
+      feature.tangentBasis().transpose() * R * d_bearing_d_pixel;
+  const Eigen::Matrix<double, 2, 3> N = bearingGauge(feature);
+  using CameraJacobian = Eigen::Matrix<double, 6, CameraError::kSize>;
+  CameraJacobian A = CameraJacobian::Zero();
+  A.topRows<3>() = row.d_camera.topRows<3>();
+  A.middleRows<2>(FeatureError::kBearing) = N * row.d_camera.bottomRows<3>();
+  A.block<2, 4>(FeatureError::kBearing, CameraError::kFocal) -=
+      d_error_d_pixel * lens.pixelByCorrection(pixel);
   auto P = covariance_.view();
   const int o = feature.offset;
-  const Eigen::Matrix<double, 2, 3> N = bearingGauge(feature);
-  P.middleRows<3>(o).leftCols(o) = P.middleRows<3>(CameraError::kPosition).leftCols(o);
-  P.middleRows<2>(o + FeatureError::kBearing).leftCols(o) =
-      N * P.middleRows<3>(CameraError::kRotation).leftCols(o);
+  P.middleRows<6>(o).leftCols(o).noalias() = A * P.topLeftCorner(CameraError::kSize, o);
   P.topRightCorner(o, 6) = P.bottomLeftCorner(6, o).transpose();
-  P.block<6, 3>(o, o) = P.block<6, 3>(o, CameraError::kPosition);
-  P.block<6, 2>(o, o + FeatureError::kBearing) =
-      P.block<6, 3>(o, CameraError::kRotation) * N.transpose();
-  const Eigen::Matrix2d d_error_d_pixel =
-      feature.tangentBasis().transpose() * R * d_bearing_d_pixel;
-  P.block<2, 2>(o + FeatureError::kBearing, o + FeatureError::kBearing) +=
-      options_.sigma_px * options_.sigma_px * d_error_d_pixel * d_error_d_pixel.transpose();
+  P.block<6, 6>(o, o) = P.block<6, CameraError::kSize>(o, 0) * A.transpose();
+  // The pixel's noise turns the bearing, and it is another row that would have shown the feature.
+  Eigen::Matrix<double, 6, 2> B = Eigen::Matrix<double, 6, 2>::Zero();
+  B.middleRows<2>(FeatureError::kBearing) = d_error_d_pixel;
+  const double row_s = camera_.readout_s / camera.height();
+  B.col(1).head<3>() += row_s * row.speed.head<3>();
+  B.col(1).segment<2>(FeatureError::kBearing) += row_s * N * row.speed.tail<3>();
+  P.block<6, 6>(o, o) += options_.sigma_px * options_.sigma_px * B * B.transpose();
   P(o + FeatureError::kInverseDepth, o + FeatureError::kInverseDepth) += sigma_rho * sigma_rho;
   const Eigen::Matrix<double, 6, 6> own = P.block<6, 6>(o, o);
   P.block<6, 6>(o, o) = 0.5 * (own + own.transpose());

@@ -20,7 +20,9 @@ bool isUnit(const Eigen::Vector3d& v) { return std::abs(v.norm() - 1.0) <= kUnit
 
 void checkCamera(const CameraState& camera) {
   if (!camera.position_world.allFinite() || !camera.velocity_world.allFinite() ||
-      !camera.angular_velocity_camera.allFinite() || !camera.q_world_camera.coeffs().allFinite())
+      !camera.angular_velocity_camera.allFinite() || !camera.q_world_camera.coeffs().allFinite() ||
+      !std::isfinite(camera.readout_s) || !std::isfinite(camera.lens.focal) ||
+      !std::isfinite(camera.lens.radial) || !camera.lens.centre_px.allFinite())
     refuse("the camera is not finite");
   if (std::abs(camera.q_world_camera.norm() - 1.0) > kUnitTolerance)
     refuse("the camera's quaternion has length " + std::to_string(camera.q_world_camera.norm()) +
@@ -94,13 +96,16 @@ void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& fe
 
 void Ekf::relocateCamera(const CameraState& camera,
                          const Eigen::Matrix<double, 12, 12>& covariance) {
+  const CameraState before = camera_;
   camera_ = camera;
   camera_.q_world_camera.normalize();
+  camera_.readout_s = before.readout_s;
+  camera_.lens = before.lens;
   auto P = covariance_.view();
-  const int map_size = covariance_.size() - CameraError::kSize;
+  const int rest = covariance_.size() - CameraError::kMotionSize;
   P.topLeftCorner<12, 12>() = 0.5 * (covariance + covariance.transpose());
-  P.topRightCorner(CameraError::kSize, map_size).setZero();
-  P.bottomLeftCorner(map_size, CameraError::kSize).setZero();
+  P.topRightCorner(CameraError::kMotionSize, rest).setZero();
+  P.bottomLeftCorner(rest, CameraError::kMotionSize).setZero();
 }
 
 }  // namespace active_matching_slam

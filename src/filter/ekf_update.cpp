@@ -11,11 +11,12 @@ namespace active_matching_slam {
 PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
                                                const std::vector<FeatureId>& ids) const {
   PredictedMeasurements predicted;
+  const CameraModel lens = camera.corrected(camera_.lens);
   MeasurementStack stack;
   for (const FeatureId id : ids) {
     const FeatureState* feature = find(id);
     if (feature == nullptr) continue;
-    const auto projection = projectFeature(camera, camera_, *feature);
+    const auto projection = projectFeature(lens, camera_, *feature);
     if (!projection) continue;
     stack.add(*feature, *projection);
     predicted.ids.push_back(id);
@@ -38,11 +39,12 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
 UpdateReport Ekf::update(const CameraModel& camera,
                          const std::vector<FeatureMeasurement>& measurements) {
   UpdateReport report;
+  const CameraModel lens = camera.corrected(camera_.lens);
   std::vector<UsableMeasurement> usable;
   for (const FeatureMeasurement& m : measurements) {
     const int index = indexOf(m.id);
     if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px)) continue;
-    if (!projectFeature(camera, camera_, features_[index])) continue;
+    if (!projectFeature(lens, camera_, features_[index])) continue;
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
     usable.push_back({index, m.pixel, sigma_px * sigma_px});
   }

@@ -25,6 +25,13 @@ void checkNotNegative(const std::string& name, double value) {
 
 }  // namespace
 
+CalibrationVector calibrationSigmas(const FilterOptions& options) {
+  CalibrationVector sigmas;
+  sigmas << options.initial_sigma_readout_s, options.initial_sigma_focal,
+      options.initial_sigma_radial, Eigen::Vector2d::Constant(options.initial_sigma_centre_px);
+  return sigmas;
+}
+
 void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("sigma_acceleration_mps2", options.sigma_acceleration_mps2);
   checkNotNegative("sigma_angular_acceleration_rps2", options.sigma_angular_acceleration_rps2);
@@ -32,6 +39,10 @@ void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("initial_sigma_velocity_mps", options.initial_sigma_velocity_mps);
   checkNotNegative("initial_sigma_angular_velocity_rps",
                    options.initial_sigma_angular_velocity_rps);
+  checkNotNegative("initial_sigma_readout_s", options.initial_sigma_readout_s);
+  checkNotNegative("initial_sigma_focal", options.initial_sigma_focal);
+  checkNotNegative("initial_sigma_radial", options.initial_sigma_radial);
+  checkNotNegative("initial_sigma_centre_px", options.initial_sigma_centre_px);
   checkPositive("initial_inverse_depth", options.initial_inverse_depth);
   checkPositive("initial_sigma_inverse_depth", options.initial_sigma_inverse_depth);
   checkNotNegative("linearity_threshold", options.linearity_threshold);

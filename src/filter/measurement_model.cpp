@@ -1,33 +1,93 @@
 #include "active_matching_slam/filter/measurement_model.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "active_matching_slam/filter/rotation.h"
 
 namespace active_matching_slam {
+namespace {
 
-std::optional<FeatureProjection> projectFeature(const CameraModel& model, const CameraState& camera,
-                                                const FeatureState& feature) {
-  const Eigen::Matrix3d R_camera_world = camera.q_world_camera.toRotationMatrix().transpose();
+/// An image that runs half as fast as it is read shows no feature where it can be foretold.
+constexpr double kMostRowsPerRow = 0.5;
+
+}  // namespace
+
+RowPose poseOfRow(const CameraModel& model, const CameraState& camera, double v) {
+  const double share = rowShare(model, v);
+  const double after_s = share * camera.readout_s;
+  const Eigen::Matrix3d R = camera.q_world_camera.toRotationMatrix();
+  const Eigen::Vector3d turn = camera.angular_velocity_camera * after_s;
+  RowPose row;
+  row.position_world = camera.position_world + after_s * camera.velocity_world;
+  row.R_world_camera = R * rotationFromVector(turn).toRotationMatrix();
+  row.speed << camera.velocity_world, R * camera.angular_velocity_camera;
+  auto& J = row.d_camera;
+  J.setZero();
+  J.block<3, 3>(0, CameraError::kPosition).setIdentity();
+  J.block<3, 3>(0, CameraError::kVelocity) = after_s * Eigen::Matrix3d::Identity();
+  J.block<3, 3>(3, CameraError::kRotation).setIdentity();
+  J.block<3, 3>(3, CameraError::kAngularVelocity) = after_s * R * leftJacobian(turn);
+  J.col(CameraError::kReadout) = share * row.speed;
+  return row;
+}
+
+std::optional<FeatureProjection> projectFromPose(const CameraModel& model,
+                                                 const Eigen::Vector3d& position_world,
+                                                 const Eigen::Matrix3d& R_world_camera,
+                                                 const FeatureState& feature,
+                                                 Eigen::Matrix<double, 2, 6>* d_pose) {
   const bool is_point = feature.kind == FeatureKind::kPoint;
   const double rho = is_point ? 1.0 : feature.inverse_depth;
   const Eigen::Vector3d from_camera =
-      (is_point ? feature.point_world : feature.anchor_world) - camera.position_world;
+      (is_point ? feature.point_world : feature.anchor_world) - position_world;
   Eigen::Vector3d ray_world = from_camera;
   if (!is_point) ray_world = rho * from_camera + feature.bearing_world;
 
   Eigen::Matrix<double, 2, 3> d_pixel_d_point;
-  const auto pixel = model.project(R_camera_world * ray_world, &d_pixel_d_point);
+  const auto pixel = model.project(R_world_camera.transpose() * ray_world, &d_pixel_d_point);
   if (!pixel || !pixel->allFinite() || !d_pixel_d_point.allFinite()) return std::nullopt;
 
   FeatureProjection projection;
   projection.pixel = *pixel;
-  projection.d_ray = d_pixel_d_point * R_camera_world;
+  projection.d_ray = d_pixel_d_point * R_world_camera.transpose();
   const auto& d_ray = projection.d_ray;
-  projection.d_camera << -rho * d_ray, d_ray * skew(ray_world);
+  *d_pose << -rho * d_ray, d_ray * skew(ray_world);
   if (is_point) {
     projection.d_feature << d_ray, Eigen::Matrix<double, 2, 3>::Zero();
   } else {
     projection.d_feature << rho * d_ray, d_ray * feature.tangentBasis(), d_ray * from_camera;
   }
+  return projection;
+}
+
+std::optional<FeatureProjection> projectFeature(const CameraModel& model, const CameraState& camera,
+                                                const FeatureState& feature) {
+  // The row depends on the pose and the pose on the row; a row takes microseconds, so that few
+  // guesses are good to thousandths of a pixel. Nothing is read outside the image.
+  const int guesses = camera.readout_s == 0.0 ? 1 : 4;
+  double v = 0.5 * model.height();
+  RowPose row;
+  Eigen::Matrix<double, 2, 6> d_pose;
+  std::optional<FeatureProjection> projection;
+  for (int guess = 0; guess < guesses; ++guess) {
+    row = poseOfRow(model, camera, v);
+    projection = projectFromPose(model, row.position_world, row.R_world_camera, feature, &d_pose);
+    if (!projection) return projection;
+    v = std::clamp(projection->pixel.y(), 0.0, static_cast<double>(model.height()));
+  }
+  if (guesses == 1) row = poseOfRow(model, camera, v);
+  projection->d_camera = d_pose * row.d_camera;
+  projection->d_camera.rightCols<4>() = model.pixelByCorrection(projection->pixel);
+  if (v != projection->pixel.y()) return projection;
+  // The pixel moves its own row.
+  const Eigen::Vector2d by_row = d_pose * row.speed * (camera.readout_s / model.height());
+  if (!(std::abs(by_row.y()) < kMostRowsPerRow)) return std::nullopt;
+  Eigen::Matrix2d M = Eigen::Matrix2d::Identity();
+  M.col(1) += by_row / (1.0 - by_row.y());
+  projection->d_camera = M * projection->d_camera;
+  projection->d_feature = M * projection->d_feature;
+  projection->d_ray = M * projection->d_ray;
   return projection;
 }
 
@@ -75,14 +135,14 @@ Eigen::MatrixXd MeasurementStack::times(const Eigen::Ref<const Eigen::MatrixXd>&
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const Block& b = blocks_[i];
     Y.middleRows<2>(2 * i) =
-        b.projection.d_camera.lazyProduct(X.topRows<6>()) +
+        b.projection.d_camera.lazyProduct(X.topRows<CameraError::kSize>()) +
         b.projection.d_feature.leftCols(b.size).lazyProduct(X.middleRows(b.offset, b.size));
   }
   return Y;
 }
 
 Eigen::MatrixXd MeasurementStack::cameraJacobian() const {
-  Eigen::MatrixXd H(rows(), 6);
+  Eigen::MatrixXd H(rows(), CameraError::kSize);
   for (std::size_t i = 0; i < blocks_.size(); ++i)
     H.middleRows<2>(2 * i) = blocks_[i].projection.d_camera;
   return H;
@@ -91,7 +151,7 @@ Eigen::MatrixXd MeasurementStack::cameraJacobian() const {
 void MeasurementStack::crossCovariance(const CovarianceMatrix& covariance,
                                        Eigen::Ref<Eigen::MatrixXd> out) const {
   const auto P = covariance.view();
-  out.noalias() = P.leftCols<6>() * cameraJacobian().transpose();
+  out.noalias() = P.leftCols<CameraError::kSize>() * cameraJacobian().transpose();
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const Block& b = blocks_[i];
     const auto& H = b.projection.d_feature;
@@ -107,7 +167,7 @@ void MeasurementStack::crossCovariance(const CovarianceMatrix& covariance,
 Eigen::MatrixXd MeasurementStack::innovationCovariance(
     const Eigen::Ref<const Eigen::MatrixXd>& PHt) const {
   Eigen::MatrixXd S(rows(), rows());
-  S.noalias() = cameraJacobian() * PHt.topRows<6>();
+  S.noalias() = cameraJacobian() * PHt.topRows<CameraError::kSize>();
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const Block& b = blocks_[i];
     const auto& H = b.projection.d_feature;

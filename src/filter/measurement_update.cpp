@@ -41,8 +41,9 @@ MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState
 
 bool MeasurementUpdate::linearise() {
   stack_.clear();
+  const CameraModel lens = model_.corrected(camera_.lens);
   for (const UsableMeasurement& m : measurements_) {
-    const auto projection = projectFeature(model_, camera_, features_[m.feature]);
+    const auto projection = projectFeature(lens, camera_, features_[m.feature]);
     if (!projection) return false;
     stack_.add(features_[m.feature], *projection);
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/rotation.h"
 
 namespace active_matching_slam {
@@ -55,6 +56,10 @@ double medianMotion(const std::vector<FeatureMeasurement>& a,
   return medianOf(std::move(lengths));
 }
 
+std::vector<Eigen::Vector2d> zeros(std::size_t count) {
+  return std::vector<Eigen::Vector2d>(count, Eigen::Vector2d::Zero());
+}
+
 bool isSameReading(const Bundle& a, const Bundle& b) {
   const Eigen::Vector3d& x = a.cameras.back().position_world;
   const Eigen::Vector3d& y = b.cameras.back().position_world;
@@ -90,6 +95,7 @@ std::size_t stride(const Bundle& bundle) {
 Bundle someImages(const Bundle& bundle) {
   Bundle some;
   some.features = bundle.features;
+  some.calibration = bundle.calibration;
   const std::size_t last = bundle.cameras.size() - 1;
   for (std::size_t k = 0; k <= last; ++k) {
     if (k != 0 && (last - k) % stride(bundle) != 0) continue;
@@ -104,6 +110,7 @@ Bundle someImages(const Bundle& bundle) {
 Bundle allImages(const Bundle& some, const Bundle& bundle) {
   Bundle all = bundle;
   all.features = some.features;
+  all.calibration = some.calibration;
   const std::size_t last = bundle.cameras.size() - 1;
   std::size_t next = 1;
   for (std::size_t k = 1; k <= last; ++k) {
@@ -176,7 +183,7 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
   for (auto& observations : bundle->observations) {
     std::vector<BundleObservation> remaining;
     for (const BundleObservation& o : observations)
-      if (place[o.feature] >= 0) remaining.push_back({place[o.feature], o.pixel});
+      if (place[o.feature] >= 0) remaining.push_back({place[o.feature], o.pixel, o.d_calibration});
     observations.swap(remaining);
   }
 }
@@ -195,7 +202,7 @@ Eigen::Isometry3d AdjustedStart::corrected(std::int64_t image,
 
 void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasurement>& first) {
   is_active_ = true;
-  images_.assign(1, {index, 0.0, CameraState(), first});
+  images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
   least_motion_px_ = 1.0;
   next_parallax_px_ = kFirstParallaxPx;
 }
@@ -204,12 +211,22 @@ void StartAdjustment::addFirstSights(const std::vector<FeatureMeasurement>& meas
   if (!is_active_ || images_.empty()) return;
   auto& known = images_.back().measurements;
   known.insert(known.end(), measurements.begin(), measurements.end());
+  images_.back().speeds.resize(known.size(), Eigen::Vector2d::Zero());
 }
 
 void StartAdjustment::add(std::int64_t index, double interval_s, const CameraState& camera,
                           const std::vector<FeatureMeasurement>& measurements) {
   if (!is_active_) return;
-  images_.push_back({index, interval_s, camera, measurements});
+  Image image{index, interval_s, camera, measurements, zeros(measurements.size())};
+  Image& before = images_.back();
+  for (std::size_t i = 0; interval_s > 0.0 && i < measurements.size(); ++i) {
+    const FeatureMeasurement* same = find(before.measurements, measurements[i].id);
+    if (same == nullptr) continue;
+    image.speeds[i] = (measurements[i].pixel - same->pixel) / interval_s;
+    Eigen::Vector2d& speed = before.speeds[same - before.measurements.data()];
+    speed = speed.isZero(0.0) ? image.speeds[i] : Eigen::Vector2d(0.5 * (speed + image.speeds[i]));
+  }
+  images_.push_back(std::move(image));
   thinOut();
 }
 
@@ -255,7 +272,8 @@ std::optional<double> StartAdjustment::parallaxToFirst(const CameraModel& model,
   return medianOf(std::move(angles)) * model.calibration().fx;
 }
 
-Bundle StartAdjustment::makeBundle(const Ekf& filter, std::vector<FeatureId>* ids) const {
+Bundle StartAdjustment::makeBundle(const CameraModel& model, const Ekf& filter,
+                                   std::vector<FeatureId>* ids) const {
   Bundle bundle;
   for (const FeatureState& feature : filter.features()) {
     const auto sightings = std::count_if(
@@ -268,10 +286,14 @@ Bundle StartAdjustment::makeBundle(const Ekf& filter, std::vector<FeatureId>* id
   for (const Image& image : images_) {
     bundle.cameras.push_back(image.camera);
     bundle.observations.emplace_back();
-    for (const FeatureMeasurement& m : image.measurements) {
+    for (std::size_t i = 0; i < image.measurements.size(); ++i) {
+      const FeatureMeasurement& m = image.measurements[i];
       const auto it = std::lower_bound(ids->begin(), ids->end(), m.id);
-      if (it != ids->end() && *it == m.id)
-        bundle.observations.back().push_back({static_cast<int>(it - ids->begin()), m.pixel});
+      if (it == ids->end() || *it != m.id) continue;
+      BundleObservation o{static_cast<int>(it - ids->begin()), m.pixel};
+      o.d_calibration << rowShare(model, m.pixel.y()) * image.speeds[i],
+          model.pixelByCorrection(m.pixel);
+      bundle.observations.back().push_back(o);
     }
   }
   return bundle;
@@ -284,7 +306,7 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   if (!parallax || *parallax >= kLastParallaxPx) end();
 
   std::vector<FeatureId> ids;
-  Bundle believed = makeBundle(filter, &ids);
+  Bundle believed = makeBundle(model, filter, &ids);
   for (const auto& observations : believed.observations)
     if (observations.size() < kLeastPoints) return std::nullopt;
   BundleOptions options;
@@ -293,6 +315,8 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   options.inverse_depth = filter.options().initial_inverse_depth;
   options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
   options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
+  // So few images would bend the lens until depths fit their prior: it stays as calibrated.
+  options.sigma_calibration[0] = filter.options().initial_sigma_readout_s;
 
   // Some of the images are enough to tell the readings apart.
   Bundle rest = believed;
@@ -359,7 +383,10 @@ std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model
                                                         const std::vector<FeatureId>& ids) const {
   const int last = static_cast<int>(bundle.cameras.size()) - 1;
   const double dt = images_.back().interval_s;
-  const Eigen::MatrixXd joint = bundleCovariance(model, options, bundle, last - 1, kScaleSigma);
+  BundleOptions doubting_lens = options;
+  doubting_lens.sigma_calibration = calibrationSigmas(filter.options());
+  const Eigen::MatrixXd joint =
+      bundleCovariance(model, doubting_lens, bundle, last - 1, kScaleSigma);
   if (joint.size() == 0 || !joint.allFinite() || !(dt > 0.0)) return std::nullopt;
 
   AdjustedStart start;
@@ -369,37 +396,42 @@ std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model
   start.camera.angular_velocity_camera =
       vectorFromRotation(before.q_world_camera.conjugate() * start.camera.q_world_camera) / dt;
 
-  // The camera's error by those of the cameras before last and last.
-  constexpr int kBefore = 0, kLast = 6, kPoses = 12;
-  using Matrix12 = Eigen::Matrix<double, CameraError::kSize, kPoses>;
+  start.camera.readout_s = bundle.calibration[0];
+  start.camera.lens = {bundle.calibration[1], bundle.calibration[2], bundle.calibration.tail<2>()};
+
+  // The camera's error by those of the cameras before last and last and of the calibration.
+  constexpr int kBefore = 0, kLast = 6, kCalibration = 12,
+                kJoint = kCalibration + CameraError::kCalibrationSize;
+  using CameraJacobian = Eigen::Matrix<double, CameraError::kSize, kJoint>;
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
   const Eigen::Matrix3d R_camera_world = start.camera.q_world_camera.toRotationMatrix().transpose();
-  Matrix12 J = Matrix12::Zero();
+  CameraJacobian J = CameraJacobian::Zero();
   J.block<3, 3>(CameraError::kPosition, kLast) = I;
   J.block<3, 3>(CameraError::kRotation, kLast + 3) = I;
   J.block<3, 3>(CameraError::kVelocity, kBefore) = -I / dt;
   J.block<3, 3>(CameraError::kVelocity, kLast) = I / dt;
   J.block<3, 3>(CameraError::kAngularVelocity, kBefore + 3) = -R_camera_world / dt;
   J.block<3, 3>(CameraError::kAngularVelocity, kLast + 3) = R_camera_world / dt;
+  J.bottomRightCorner<CameraError::kCalibrationSize, CameraError::kCalibrationSize>().setIdentity();
 
   const int F = static_cast<int>(ids.size());
   start.covariance = Eigen::MatrixXd::Zero(CameraError::kSize + 6 * F, CameraError::kSize + 6 * F);
   auto camera = start.covariance.topLeftCorner<CameraError::kSize, CameraError::kSize>();
-  camera = J * joint.topLeftCorner<kPoses, kPoses>() * J.transpose();
+  camera = J * joint.topLeftCorner<kJoint, kJoint>() * J.transpose();
   camera = 0.5 * (camera + camera.transpose()).eval();
   for (int i = 0; i < F; ++i) {
     FeatureState feature = bundle.features[i];
     feature.id = ids[i];
     feature.offset = CameraError::kSize + 6 * i;
     start.features.push_back(feature);
-    const int row = feature.offset + FeatureError::kBearing, from = kPoses + 3 * i;
+    const int row = feature.offset + FeatureError::kBearing, from = kJoint + 3 * i;
     auto columns = start.covariance.middleCols<3>(row);
-    columns.topRows<CameraError::kSize>() = J * joint.block<kPoses, 3>(0, from);
+    columns.topRows<CameraError::kSize>() = J * joint.block<kJoint, 3>(0, from);
     start.covariance.block<3, CameraError::kSize>(row, 0) =
         columns.topRows<CameraError::kSize>().transpose();
     for (int k = 0; k < F; ++k)
       columns.middleRows<3>(CameraError::kSize + 6 * k + FeatureError::kBearing) =
-          joint.block<3, 3>(kPoses + 3 * k, from);
+          joint.block<3, 3>(kJoint + 3 * k, from);
   }
   const FilterOptions& noise = filter.options();
   start.covariance.diagonal().segment<3>(CameraError::kVelocity).array() +=

@@ -27,6 +27,10 @@ void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& cam
   camera.position_world += J * delta.segment<3>(CameraError::kPosition);
   camera.velocity_world += J * delta.segment<3>(CameraError::kVelocity);
   camera.angular_velocity_camera += delta.segment<3>(CameraError::kAngularVelocity);
+  camera.readout_s += delta[CameraError::kReadout];
+  camera.lens.focal += delta[CameraError::kFocal];
+  camera.lens.radial += delta[CameraError::kRadial];
+  camera.lens.centre_px += delta.segment<2>(CameraError::kCentre);
   camera.q_world_camera = (rotationFromVector(theta) * camera.q_world_camera).normalized();
   for (FeatureState& feature : features) {
     if (feature.kind == FeatureKind::kPoint) {

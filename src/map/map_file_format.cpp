@@ -12,7 +12,7 @@ namespace {
 
 /// Both line ends reveal a transfer as text.
 constexpr char kMagic[9] = "AMSMAP\r\n";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeaderSize = 8 + 4 + 4 + 8;
 constexpr std::size_t kMaximumName = 1024, kMaximumDistortion = 16;
 constexpr std::size_t kMinimumFeature = 8 + 1 + 13 * 8;  ///< bytes of a FeatureState
@@ -126,14 +126,20 @@ void write(const CameraState& camera, Writer* out) {
   out->reals(camera.q_world_camera.coeffs());
   out->reals(camera.velocity_world);
   out->reals(camera.angular_velocity_camera);
+  for (double value : {camera.readout_s, camera.lens.focal, camera.lens.radial}) out->real(value);
+  out->reals(camera.lens.centre_px);
 }
 
-CameraState readCameraState(Reader* in) {
+CameraState readCameraState(std::uint32_t version, Reader* in) {
   CameraState camera;
   in->reals(camera.position_world);
   in->reals(camera.q_world_camera.coeffs());
   in->reals(camera.velocity_world);
   in->reals(camera.angular_velocity_camera);
+  if (version < 2) return camera;
+  for (double* value : {&camera.readout_s, &camera.lens.focal, &camera.lens.radial})
+    *value = in->real();
+  in->reals(camera.lens.centre_px);
   return camera;
 }
 
@@ -250,14 +256,14 @@ void check(const MapFileContent& content) {
   }
 }
 
-MapFileContent readContent(Reader* in) {
+MapFileContent readContent(std::uint32_t version, Reader* in) {
   MapFileContent content;
   content.camera = readCamera(in);
   content.template_size_px = in->smallInteger("template size", 1, kMaximumPatchSize);
   content.source_patch_size_px = in->smallInteger("source patch size", 1, kMaximumPatchSize);
   content.scale_source = in->smallInteger("scale source", 0, 255);
   content.next_id = in->integer();
-  content.camera_state = readCameraState(in);
+  content.camera_state = readCameraState(version, in);
   const auto count = static_cast<std::size_t>(in->integer(
       "number of features", 0, static_cast<std::int64_t>(in->remaining() / kMinimumFeature)));
   content.features.reserve(count);
@@ -268,14 +274,23 @@ MapFileContent readContent(Reader* in) {
     size += content.features.back().size();
   }
   for (std::size_t i = 0; i < count; ++i) content.map.push_back(readMapFeature(in));
-  // Nothing but the lower triangle is left; so its size is known before it is allocated.
-  if (in->remaining() != 8 * (size * (size + 1) / 2))
+  // Nothing but the lower triangle is left; so its size is known before it is allocated. Version 1
+  // has no calibration in it.
+  const std::size_t calibration = version < 2 ? CameraError::kCalibrationSize : 0;
+  const std::size_t stored = size - calibration;
+  if (in->remaining() != 8 * (stored * (stored + 1) / 2))
     throw std::runtime_error("the covariance is not that of " + std::to_string(count) +
                              " features");
-  content.covariance.resize(size, size);
-  for (std::size_t j = 0; j < size; ++j)
-    for (std::size_t i = j; i < size; ++i)
-      content.covariance(i, j) = content.covariance(j, i) = in->real();
+  const auto place = [calibration](std::size_t i) {
+    return i < CameraError::kMotionSize ? i : i + calibration;
+  };
+  content.covariance = Eigen::MatrixXd::Zero(size, size);
+  for (std::size_t j = 0; j < stored; ++j)
+    for (std::size_t i = j; i < stored; ++i)
+      content.covariance(place(i), place(j)) = content.covariance(place(j), place(i)) = in->real();
+  if (calibration > 0)
+    content.covariance.diagonal().segment<CameraError::kCalibrationSize>(CameraError::kMotionSize) =
+        calibrationSigmas(FilterOptions()).array().square();
   return content;
 }
 
@@ -334,7 +349,7 @@ MapFileContent parseMap(const std::string& bytes) {
   if (checksum(bytes.data() + 16, bytes.size() - 16) != expected_checksum)
     throw std::runtime_error("it is damaged: the checksum does not match");
   try {
-    MapFileContent content = readContent(&in);
+    MapFileContent content = readContent(version, &in);
     check(content);
     return content;
   } catch (const std::invalid_argument& error) {

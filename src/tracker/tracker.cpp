@@ -122,6 +122,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     describe(frame.get());
     return frame;
   }
+  camera_ = camera_.corrected(filter_.camera().lens);
   frame->image = image;
   frame->repeated_image = !previous_image_.empty() && isRepeatedImage(image, previous_image_);
   last_stamp_s_ = stamp_s;

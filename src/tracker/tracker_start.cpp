@@ -58,7 +58,7 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
 /// Lets the first images, taken together, correct what the filter made of them one by one.
 void Tracker::Implementation::adjustStart(TrackedFrame* frame) {
   start_adjustment_.add(frame->index, interval_s_, filter_.camera(), fused_);
-  const auto adjusted = start_adjustment_.adjust(camera_, filter_);
+  const auto adjusted = start_adjustment_.adjust(camera_.corrected({}), filter_);
   if (!adjusted) return;
   std::vector<FeatureId> dropped;  // seen too rarely to take part
   auto kept = adjusted->features.begin();

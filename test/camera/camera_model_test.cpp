@@ -26,11 +26,24 @@ std::vector<Eigen::Vector3d> pointsInView(const CameraModel& camera, int count) 
   return points;
 }
 
+constexpr int kLenses = 7;
+
+/// More than any calibration should get wrong.
+LensCorrection largeCorrection() { return {0.06, -0.04, {5.0, -7.0}}; }
+
+/// As calibrated, the second time through corrected with a large correction.
 class EveryLens : public testing::TestWithParam<int> {
+ protected:
+  CameraModel camera_ = CameraModel(lenses()[GetParam() % kLenses])
+                            .corrected(GetParam() < kLenses ? LensCorrection() : largeCorrection());
+};
+INSTANTIATE_TEST_SUITE_P(Lenses, EveryLens, testing::Range(0, 2 * kLenses));
+
+class EveryCalibratedLens : public testing::TestWithParam<int> {
  protected:
   CameraModel camera_{lenses()[GetParam()]};
 };
-INSTANTIATE_TEST_SUITE_P(Lenses, EveryLens, testing::Range(0, 7));
+INSTANTIATE_TEST_SUITE_P(Lenses, EveryCalibratedLens, testing::Range(0, kLenses));
 
 TEST_P(EveryLens, ProjectionJacobianEqualsNumericalDerivative) {
   for (const Eigen::Vector3d& point : pointsInView(camera_, 200)) {
@@ -76,18 +89,59 @@ TEST_P(EveryLens, JacobiansOfProjectionAndUnprojectionAreInverse) {
 }
 
 TEST_P(EveryLens, EveryPixelOfTheImageSurvivesTheRoundTrip) {
+  const double bound = GetParam() < kLenses ? 1e-9 : 1e-8;  // a correction is inverted by itself
   for (int v = 0; v < camera_.height(); v += 5) {
     for (int u = 0; u < camera_.width(); u += 5) {
       const Eigen::Vector2d pixel(u, v);
       const auto bearing = camera_.unproject(pixel);
       ASSERT_TRUE(bearing) << pixel.transpose();
       EXPECT_NEAR(bearing->norm(), 1.0, 1e-14);
-      EXPECT_LT((*camera_.project(*bearing) - pixel).norm(), 1e-9);
+      EXPECT_LT((*camera_.project(*bearing) - pixel).norm(), bound);
     }
   }
 }
 
-TEST_P(EveryLens, ProjectionAgreesWithOpenCv) {
+TEST_P(EveryLens, PixelByCorrectionEqualsNumericalDerivative) {
+  const LensCorrection correction = GetParam() < kLenses ? LensCorrection() : largeCorrection();
+  for (const Eigen::Vector3d& point : pointsInView(camera_, 50)) {
+    const auto pixelWith = [&](const Eigen::Vector4d& d) {
+      const LensCorrection moved{correction.focal + d[0], correction.radial + d[1],
+                                 correction.centre_px + d.tail<2>()};
+      return *camera_.corrected(moved).project(point);
+    };
+    const Eigen::Matrix<double, 2, 4> analytic = camera_.pixelByCorrection(*camera_.project(point));
+    for (int k = 0; k < 4; ++k) {
+      // The pixel is linear in its correction: any step will do.
+      const Eigen::Vector4d e = 1e-2 * Eigen::Vector4d::Unit(k);
+      const Eigen::Vector2d numeric = (pixelWith(e) - pixelWith(-e)) / 2e-2;
+      EXPECT_LT((analytic.col(k) - numeric).norm(), 1e-9 * (1.0 + numeric.norm())) << k;
+    }
+  }
+}
+
+TEST_P(EveryCalibratedLens, ACorrectionMovesPixelsAsItsDefinitionSays) {
+  const CameraCalibration& c = camera_.calibration();
+  const Eigen::Vector2d centre(c.cx, c.cy);
+  const LensCorrection l = largeCorrection();
+  for (const Eigen::Vector3d& point : pointsInView(camera_, 50)) {
+    const Eigen::Vector2d offset = *camera_.project(point) - centre;
+    const double n2 = std::pow(offset.x() / c.fx, 2) + std::pow(offset.y() / c.fy, 2);
+    const Eigen::Vector2d expected =
+        centre + l.centre_px + (1.0 + l.focal + l.radial * n2) * offset;
+    EXPECT_LT((*camera_.corrected(l).project(point) - expected).norm(), 1e-9);
+  }
+}
+
+TEST_P(EveryCalibratedLens, NoCorrectionIsTheCalibrationBitForBitAlsoInPlaceOfAnother) {
+  const CameraModel none = camera_.corrected(largeCorrection()).corrected({});
+  for (const Eigen::Vector3d& point : pointsInView(camera_, 50)) {
+    const Eigen::Vector2d pixel = *camera_.project(point);
+    EXPECT_EQ(*none.project(point), pixel);
+    EXPECT_EQ(*none.unproject(pixel), *camera_.unproject(pixel));
+  }
+}
+
+TEST_P(EveryCalibratedLens, ProjectionAgreesWithOpenCv) {
   const CameraCalibration& c = camera_.calibration();
   const std::vector<Eigen::Vector3d> points = pointsInView(camera_, 200);
   std::vector<cv::Point3d> cv_points;
@@ -125,7 +179,7 @@ TEST_P(EveryLens, PixelsThatAreNotFiniteHaveNoBearing) {
   EXPECT_FALSE(camera_.unproject({100.0, INFINITY}));
 }
 
-TEST_P(EveryLens, PrincipalPointLooksAlongTheOpticalAxis) {
+TEST_P(EveryCalibratedLens, PrincipalPointLooksAlongTheOpticalAxis) {
   const CameraCalibration& c = camera_.calibration();
   Eigen::Matrix<double, 3, 2> jacobian;
   const auto bearing = camera_.unproject({c.cx, c.cy}, &jacobian);
@@ -152,6 +206,20 @@ TEST(CameraModel, TheFieldEndsBeforeAPoleOfTheRationalModel) {
   EXPECT_TRUE(camera.project({1.41, 0.0, 1.0}));
   EXPECT_FALSE(camera.project({1.42, 0.0, 1.0}));
   EXPECT_FALSE(camera.project({3.0, 0.0, 1.0}));
+}
+
+TEST(CameraModel, TheFieldEndsWhereACorrectionFoldsOver) {
+  // r (1 - 0.04 r^2) turns back at r = 1 / sqrt(0.12) and comes out on the other side at r = 5.
+  const CameraModel camera =
+      CameraModel(makeCalibration(DistortionModel::kNone, {})).corrected({0.0, -0.04, {0.0, 0.0}});
+  const double rim = 1.0 / std::sqrt(0.12);
+  EXPECT_TRUE(camera.project({0.999 * rim, 0.0, 1.0}));
+  for (const double radius : {1.001 * rim, 4.0, 5.01, 6.0, 20.0})
+    EXPECT_FALSE(camera.project({radius, 0.0, 1.0})) << radius;
+  const double largest_pixel_radius = 410.5 * rim * (1.0 - 0.04 * rim * rim);
+  EXPECT_TRUE(camera.unproject({322.75 + 0.9999 * largest_pixel_radius, 236.125}));
+  for (const double factor : {1.0001, 1.1, 2.0, 10.0})
+    EXPECT_FALSE(camera.unproject({322.75 + factor * largest_pixel_radius, 236.125})) << factor;
 }
 
 TEST(CameraModel, TheFieldIsOneToOneWithTangentialDistortionToo) {

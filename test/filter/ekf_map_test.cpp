@@ -23,31 +23,36 @@ TEST_F(EkfMap, PredictionEqualsThePlainFormulaWithANumericalJacobian) {
   const int n = before.stateSize();
 
   // Motion of the mean perturbed by the camera's error and by the impulses, from the equations.
+  constexpr int kCamera = CameraError::kSize, kAll = kCamera + 6;
   const auto moved = [&](const Eigen::VectorXd& d) {
     CameraState camera = before.camera();
     std::vector<FeatureState> none;
-    applyError(d.head<12>(), camera, none);
-    camera.velocity_world += d.segment<3>(12);
-    camera.angular_velocity_camera += d.segment<3>(15);
+    applyError(d.head<kCamera>(), camera, none);
+    camera.velocity_world += d.segment<3>(kCamera);
+    camera.angular_velocity_camera += d.segment<3>(kCamera + 3);
     camera.position_world += camera.velocity_world * dt;
     camera.q_world_camera =
         camera.q_world_camera * rotationFromVector(camera.angular_velocity_camera * dt);
-    return errorBetween(filter.camera(), none, camera, none, 12);
+    return errorBetween(filter.camera(), none, camera, none, kCamera);
   };
-  Eigen::MatrixXd J(12, 18);
-  for (int i = 0; i < 18; ++i) {
-    const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(18, i);
+  Eigen::MatrixXd J(kCamera, kAll);
+  for (int i = 0; i < kAll; ++i) {
+    const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(kAll, i);
     J.col(i) = (moved(d) - moved(-d)) / (2.0 * step);
   }
-  EXPECT_LT(moved(Eigen::VectorXd::Zero(18)).norm(), 1e-14) << "mean";
+  EXPECT_LT(moved(Eigen::VectorXd::Zero(kAll)).norm(), 1e-14) << "mean";
   Eigen::MatrixXd F = Eigen::MatrixXd::Identity(n, n);
-  F.topLeftCorner<12, 12>() = J.leftCols<12>();
+  F.topLeftCorner<kCamera, kCamera>() = J.leftCols<kCamera>();
   Eigen::Matrix<double, 6, 6> Q = Eigen::Matrix<double, 6, 6>::Identity();
   Q *= dt * dt;  // both accelerations are 1 here
   Eigen::MatrixXd P = F * before.covariance() * F.transpose();
-  P.topLeftCorner<12, 12>() += J.rightCols<6>() * Q * J.rightCols<6>().transpose();
+  P.topLeftCorner<kCamera, kCamera>() += J.rightCols<6>() * Q * J.rightCols<6>().transpose();
   EXPECT_LT((filter.covariance() - P).norm(), 1e-8 * P.norm());
   EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
+  // The calibration is no motion: nothing of it or of what it has in common with the map changes.
+  const Eigen::MatrixXd calibration = before.covariance().bottomRightCorner(n - 12, n - 12);
+  ASSERT_GT(calibration.topRightCorner(5, n - kCamera).cwiseAbs().maxCoeff(), 0.0);
+  EXPECT_EQ(filter.covariance().bottomRightCorner(n - 12, n - 12), calibration);
 }
 
 TEST_F(EkfMap, PredictionOverNoTimeOrNonsenseChangesNothing) {
@@ -61,56 +66,89 @@ TEST_F(EkfMap, PredictionOverNoTimeOrNonsenseChangesNothing) {
 }
 
 TEST_F(EkfMap, ANewFeatureIsPredictedWhereItWasSeenWhateverItsDepth) {
-  Ekf filter = exampleFilter(model_, 3);
-  Random random(3);
-  for (int i = 0; i < 20; ++i) {
-    const Eigen::Vector2d pixel = random.pixel();
-    const FeatureId id = filter.addInverseDepthFeature(model_, pixel, random.uniform(0.01, 2.0));
-    ASSERT_GE(id, 0);
-    const PredictedMeasurements predicted = filter.predictMeasurements(model_, {id});
-    EXPECT_LT((predicted.z - pixel).norm(), 1e-6);
-    // The camera's error cancels: what is left is the pixel's noise, at first sight and now.
-    EXPECT_LT((predicted.S - 2.0 * Eigen::Matrix2d::Identity()).norm(), 1e-5);
+  // A doubtful row would add its place times the doubtful depth, a term of second order.
+  FilterOptions options = exampleOptions();
+  options.initial_sigma_readout_s = 0.0;
+  CameraState another_lens;
+  another_lens.lens = poorlyCalibratedCamera().lens;
+  for (const CameraState& calibration : {CameraState(), another_lens}) {
+    Ekf filter = exampleFilter(model_, 3, 6, calibration, options);
+    Random random(3);
+    for (int i = 0; i < 20; ++i) {
+      const Eigen::Vector2d pixel = random.pixel();
+      const FeatureId id = filter.addInverseDepthFeature(model_, pixel, random.uniform(0.01, 2.0));
+      ASSERT_GE(id, 0);
+      const PredictedMeasurements predicted = filter.predictMeasurements(model_, {id});
+      EXPECT_LT((predicted.z - pixel).norm(), 1e-6);
+      // The camera's error cancels: what is left is the pixel's noise, at first sight and now.
+      EXPECT_LT((predicted.S - 2.0 * Eigen::Matrix2d::Identity()).norm(), 1e-5);
+    }
   }
 }
 
-TEST_F(EkfMap, ANewFeatureIsFullyCorrelatedWithThePose) {
-  const Ekf before = exampleFilter(model_, 4);
-  Ekf filter = before;
-  const Eigen::Vector2d pixel(200.0, 300.0);
-  const FeatureId id = filter.addInverseDepthFeature(model_, pixel, 0.4, 0.2);
-  const FeatureState& feature = *filter.find(id);
-  const int n = before.stateSize();
-  // Numerical Jacobian of (anchor, bearing, rho) by pose, pixel and rho.
-  const auto created = [&](const Eigen::VectorXd& d) {
-    CameraState camera = before.camera();
-    std::vector<FeatureState> none;
-    Eigen::VectorXd pose = Eigen::VectorXd::Zero(12);
-    pose.head<6>() = d.head<6>();
-    applyError(pose, camera, none);
-    Eigen::VectorXd error(6);
-    const Eigen::Vector3d bearing =
-        camera.q_world_camera * *model_.unproject(pixel + Eigen::Vector2d(d.segment<2>(6)));
-    error << camera.position_world - feature.anchor_world,
-        feature.tangentBasis().transpose() * (bearing - feature.bearing_world), d[8];
-    return error;
-  };
-  Eigen::MatrixXd J(6, 9);
-  for (int i = 0; i < 9; ++i) {
-    const double step = i >= 6 && i < 8 ? 1e-2 : 1e-5;
-    const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(9, i);
-    J.col(i) = (created(d) - created(-d)) / (2.0 * step);
+TEST_F(EkfMap, ANewFeatureIsFullyCorrelatedWithTheCamera) {
+  for (const CameraState& calibration : {CameraState(), poorlyCalibratedCamera()}) {
+    const Ekf before = exampleFilter(model_, 4, 6, calibration);
+    Ekf filter = before;
+    const Eigen::Vector2d pixel(200.0, 300.0);
+    const FeatureId id = filter.addInverseDepthFeature(model_, pixel, 0.4, 0.2);
+    const FeatureState& feature = *filter.find(id);
+    const int n = before.stateSize();
+    // Numerical Jacobian of (anchor, bearing, rho) by camera, pixel and rho.
+    constexpr int kCamera = CameraError::kSize;
+    const auto created = [&](const Eigen::VectorXd& d) {
+      CameraState camera = before.camera();
+      std::vector<FeatureState> none;
+      applyError(d.head<kCamera>(), camera, none);
+      Eigen::VectorXd error(6);
+      const RowPose row = poseOfRow(model_, camera, pixel.y() + d[kCamera + 1]);
+      const Eigen::Vector3d bearing =
+          row.R_world_camera *
+          *model_.corrected(camera.lens).unproject(pixel + Eigen::Vector2d(d.segment<2>(kCamera)));
+      error << row.position_world - feature.anchor_world,
+          feature.tangentBasis().transpose() * (bearing - feature.bearing_world), d[kCamera + 2];
+      return error;
+    };
+    Eigen::MatrixXd J(6, kCamera + 3);
+    for (int i = 0; i < J.cols(); ++i) {
+      const double step = i >= CameraError::kCentre && i < kCamera + 2 ? 1e-2 : 1e-5;
+      const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(J.cols(), i);
+      J.col(i) = (created(d) - created(-d)) / (2.0 * step);
+    }
+    Eigen::MatrixXd grow = Eigen::MatrixXd::Zero(n + 6, n + 3);
+    grow.topLeftCorner(n, n).setIdentity();
+    grow.bottomLeftCorner<6, kCamera>() = J.leftCols<kCamera>();
+    grow.bottomRightCorner<6, 3>() = J.rightCols<3>();
+    Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + 3, n + 3);
+    joint.topLeftCorner(n, n) = before.covariance();
+    joint.bottomRightCorner<3, 3>() = Eigen::Vector3d(1.0, 1.0, 0.04).asDiagonal();
+    const Eigen::MatrixXd P = grow * joint * grow.transpose();
+    // Variances of pixels and of the small rest: each by its own size.
+    const Eigen::VectorXd sigma = P.diagonal().cwiseSqrt();
+    const Eigen::MatrixXd error =
+        (filter.covariance() - P).cwiseQuotient(sigma * sigma.transpose());
+    EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_LT((filter.covariance() - P).norm(), 1e-8 * P.norm());
+    EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
   }
-  Eigen::MatrixXd grow = Eigen::MatrixXd::Zero(n + 6, n + 3);
-  grow.topLeftCorner(n, n).setIdentity();
-  grow.bottomLeftCorner<6, 6>() = J.leftCols<6>();
-  grow.bottomRightCorner<6, 3>() = J.rightCols<3>();
-  Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + 3, n + 3);
-  joint.topLeftCorner(n, n) = before.covariance();
-  joint.bottomRightCorner<3, 3>() = Eigen::Vector3d(1.0, 1.0, 0.04).asDiagonal();
-  const Eigen::MatrixXd P = grow * joint * grow.transpose();
-  EXPECT_LT((filter.covariance() - P).norm(), 1e-8 * P.norm());
-  EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
+}
+
+TEST_F(EkfMap, AFreshCalibrationIsAsUncertainAsTheOptionsSay) {
+  FilterOptions options = exampleOptions();
+  options.initial_sigma_readout_s = 0.02;
+  options.initial_sigma_focal = 0.03;
+  options.initial_sigma_radial = 0.04;
+  options.initial_sigma_centre_px = 5.0;
+  Ekf filter = exampleFilter(model_, 11, 6, CameraState(), options);
+  Random random(11);
+  const Eigen::Matrix<double, 12, 12> motion = exampleCameraCovariance(random);
+  filter.reset(poorlyCalibratedCamera(), motion);
+  Eigen::MatrixXd P = Eigen::MatrixXd::Zero(CameraError::kSize, CameraError::kSize);
+  P.topLeftCorner<12, 12>() = motion;
+  P.diagonal().tail<5>() << 4e-4, 9e-4, 16e-4, 25.0, 25.0;
+  EXPECT_LT((filter.covariance() - P).norm(), 1e-15);
+  EXPECT_EQ(filter.camera().readout_s, poorlyCalibratedCamera().readout_s);
+  EXPECT_EQ(filter.camera().lens.centre_px, poorlyCalibratedCamera().lens.centre_px);
 }
 
 TEST_F(EkfMap, FeaturesThatCanNotBeUnprojectedAreRefused) {
@@ -133,8 +171,8 @@ TEST_F(EkfMap, RemovingKeepsTheRestOfTheCovariance) {
     offset += a.size();
     const FeatureState& was_a = *before.find(a.id);
     EXPECT_EQ(a.position(), was_a.position());
-    EXPECT_EQ(filter.covariance().block(0, a.offset, 12, a.size()),
-              before.covariance().block(0, was_a.offset, 12, a.size()));
+    EXPECT_EQ(filter.covariance().block(0, a.offset, CameraError::kSize, a.size()),
+              before.covariance().block(0, was_a.offset, CameraError::kSize, a.size()));
     for (const FeatureState& b : filter.features()) {
       EXPECT_EQ(
           filter.covariance().block(a.offset, b.offset, a.size(), b.size()),
@@ -152,7 +190,7 @@ TEST_F(EkfMap, IdsAreNeverUsedAgain) {
   filter.removeFeatures({first});
   const FeatureId second = filter.addInverseDepthFeature(model_, Eigen::Vector2d(100.0, 100.0));
   filter.reset(CameraState(), 1e-4 * Eigen::Matrix<double, 12, 12>::Identity());
-  EXPECT_EQ(filter.stateSize(), 12);
+  EXPECT_EQ(filter.stateSize(), CameraError::kSize);
   const FeatureId third =
       filter.addPointFeature(Eigen::Vector3d(0.0, 0.0, 1.0), 1e-4 * Eigen::Matrix3d::Identity());
   EXPECT_LT(first, second);

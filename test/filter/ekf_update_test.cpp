@@ -16,14 +16,20 @@ class EkfUpdate : public ::testing::Test {
   const CameraModel model_{exampleCalibration()};
 };
 
+/// Through the lens that the filter believes in.
+std::optional<FeatureProjection> seenBy(const Ekf& filter, const CameraModel& model,
+                                        const FeatureState& feature) {
+  return projectFeature(model.corrected(filter.camera().lens), filter.camera(), feature);
+}
+
 /// H written out in full.
 Eigen::MatrixXd denseJacobian(const Ekf& filter, const CameraModel& model,
                               const std::vector<FeatureId>& ids) {
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2 * ids.size(), filter.stateSize());
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const FeatureState& feature = *filter.find(ids[i]);
-    const auto projection = projectFeature(model, filter.camera(), feature);
-    H.block<2, 6>(2 * i, 0) = projection->d_camera;
+    const auto projection = seenBy(filter, model, feature);
+    H.block<2, CameraError::kSize>(2 * i, 0) = projection->d_camera;
     H.block(2 * i, feature.offset, 2, feature.size()) =
         projection->d_feature.leftCols(feature.size());
   }
@@ -42,8 +48,8 @@ Eigen::MatrixXd measurementNoise(const Ekf& filter, const CameraModel& model,
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const FeatureState& feature = *filter.find(ids[i]);
     if (feature.kind != FeatureKind::kInverseDepth) continue;
-    R.block<2, 2>(2 * i, 2 * i) += secondOrderNoise(
-        *projectFeature(model, filter.camera(), feature), relativeCovariance(feature, P));
+    R.block<2, 2>(2 * i, 2 * i) +=
+        secondOrderNoise(*seenBy(filter, model, feature), relativeCovariance(feature, P));
   }
   return R;
 }
@@ -53,19 +59,22 @@ double relativeDifference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 }
 
 TEST_F(EkfUpdate, PredictedMeasurementsEqualThePlainFormula) {
-  const Ekf filter = exampleFilter(model_, 1);
-  const PredictedMeasurements predicted = filter.predictMeasurements(model_, idsOf(filter));
-  ASSERT_GT(predicted.ids.size(), 12u);
-  const Eigen::MatrixXd H = denseJacobian(filter, model_, predicted.ids);
-  Eigen::MatrixXd S = H * filter.covariance() * H.transpose();
-  S += measurementNoise(filter, model_, predicted.ids);
-  EXPECT_LT(relativeDifference(predicted.S, S), 1e-13);
-  EXPECT_EQ(predicted.S, predicted.S.transpose().eval());
+  for (const CameraState& calibration : {CameraState(), poorlyCalibratedCamera()}) {
+    const Ekf filter = exampleFilter(model_, 1, 6, calibration);
+    const PredictedMeasurements predicted = filter.predictMeasurements(model_, idsOf(filter));
+    ASSERT_GT(predicted.ids.size(), 12u);
+    const Eigen::MatrixXd H = denseJacobian(filter, model_, predicted.ids);
+    Eigen::MatrixXd S = H * filter.covariance() * H.transpose();
+    S += measurementNoise(filter, model_, predicted.ids);
+    EXPECT_LT(relativeDifference(predicted.S, S), 1e-13);
+    EXPECT_EQ(predicted.S, predicted.S.transpose().eval());
+  }
 }
 
 TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
   for (const unsigned seed : {1u, 2u, 3u}) {
-    Ekf filter = exampleFilter(model_, seed);
+    Ekf filter =
+        exampleFilter(model_, seed, 6, seed == 1u ? CameraState() : poorlyCalibratedCamera());
     Random random(seed + 100);
     auto measurements = noisyMeasurements(filter, model_, 3.0, random);
     measurements.resize(measurements.size() / 2);
@@ -91,8 +100,7 @@ TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
     Eigen::VectorXd innovation(rows);
     for (std::size_t i = 0; i < ids.size(); ++i) {
       innovation.segment<2>(2 * i) =
-          measurements[i].pixel -
-          projectFeature(model_, before.camera(), *before.find(ids[i]))->pixel;
+          measurements[i].pixel - seenBy(before, model_, *before.find(ids[i]))->pixel;
     }
     const Eigen::VectorXd delta = K * innovation;
     CameraState camera = before.camera();
@@ -121,7 +129,7 @@ double posteriorCost(const Ekf& before, const Ekf& after, const CameraModel& mod
                                              after.features(), before.stateSize());
   double cost = delta.dot(Eigen::MatrixXd(before.covariance()).ldlt().solve(delta));
   for (const FeatureMeasurement& m : measurements) {
-    const auto projection = projectFeature(model, after.camera(), *after.find(m.id));
+    const auto projection = seenBy(after, model, *after.find(m.id));
     const double sigma_px = before.options().sigma_px;
     cost += (m.pixel - projection->pixel).squaredNorm() / (sigma_px * sigma_px);
   }
@@ -277,6 +285,20 @@ TEST_F(EkfUpdate, StaysSymmetricAndPositiveOverALongRun) {
     ASSERT_GT(values.minCoeff(), -1e-13 * values.maxCoeff()) << frame;
     ASSERT_NEAR(filter.camera().q_world_camera.norm(), 1.0, 1e-14);
   }
+}
+
+TEST_F(EkfUpdate, ACalibrationBeyondDoubtStaysAsItIs) {
+  FilterOptions certain = exampleOptions();
+  certain.initial_sigma_readout_s = certain.initial_sigma_focal = 0.0;
+  certain.initial_sigma_radial = certain.initial_sigma_centre_px = 0.0;
+  const CameraState given = poorlyCalibratedCamera();
+  const Ekf filter = exampleFilter(model_, 10, 6, given, certain);
+  EXPECT_TRUE(filter.covariance().middleRows<5>(CameraError::kReadout).isZero(0.0));
+  EXPECT_TRUE(filter.covariance().middleCols<5>(CameraError::kReadout).isZero(0.0));
+  EXPECT_EQ(filter.camera().readout_s, given.readout_s);
+  EXPECT_EQ(filter.camera().lens.focal, given.lens.focal);
+  EXPECT_EQ(filter.camera().lens.radial, given.lens.radial);
+  EXPECT_EQ(filter.camera().lens.centre_px, given.lens.centre_px);
 }
 
 TEST_F(EkfUpdate, IsTheSameBitForBitWhenRepeated) {

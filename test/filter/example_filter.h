@@ -28,6 +28,8 @@ inline CameraCalibration exampleCalibration() {
 /// Fixed for the tests, whatever suits live use.
 inline FilterOptions exampleOptions() {
   FilterOptions options;
+  options.initial_sigma_focal = options.initial_sigma_radial = 0.01;
+  options.initial_sigma_centre_px = 3.0;
   options.sigma_acceleration_mps2 = 1.0;
   options.sigma_angular_acceleration_rps2 = 1.0;
   options.sigma_px = 1.0;
@@ -69,6 +71,14 @@ inline CameraState exampleCamera(Random& random) {
   return camera;
 }
 
+/// Reads its rows one after the other and has another lens than its calibration says.
+inline CameraState poorlyCalibratedCamera() {
+  CameraState camera;
+  camera.readout_s = 0.03;
+  camera.lens = {0.01, -0.02, Eigen::Vector2d(2.0, -3.0)};
+  return camera;
+}
+
 inline Eigen::Matrix<double, 12, 12> exampleCameraCovariance(Random& random) {
   Eigen::Matrix<double, 12, 12> A;
   for (int i = 0; i < A.size(); ++i) A.data()[i] = random.normal(0.02);
@@ -97,10 +107,16 @@ inline std::vector<FeatureMeasurement> noisyMeasurements(const Ekf& filter,
 }
 
 /// A filter in mid-flight: inverse-depth features of several ages and known points, all correlated.
-inline Ekf exampleFilter(const CameraModel& model, unsigned seed, int features = 6) {
+/// Of `calibration` the readout and the lens are taken.
+inline Ekf exampleFilter(const CameraModel& model, unsigned seed, int features = 6,
+                         const CameraState& calibration = CameraState(),
+                         const FilterOptions& options = exampleOptions()) {
   Random random(seed);
-  Ekf filter(exampleOptions());
-  filter.reset(exampleCamera(random), exampleCameraCovariance(random));
+  Ekf filter(options);
+  CameraState camera = exampleCamera(random);
+  camera.readout_s = calibration.readout_s;
+  camera.lens = calibration.lens;
+  filter.reset(camera, exampleCameraCovariance(random));
   for (int step = 0; step < 4; ++step) {
     filter.predict(0.05);
     filter.update(model, noisyMeasurements(filter, model, 1.0, random));
@@ -129,6 +145,10 @@ inline Eigen::VectorXd errorBetween(const CameraState& camera,
   delta.segment<3>(CameraError::kVelocity) = other.velocity_world - camera.velocity_world;
   delta.segment<3>(CameraError::kAngularVelocity) =
       other.angular_velocity_camera - camera.angular_velocity_camera;
+  delta[CameraError::kReadout] = other.readout_s - camera.readout_s;
+  delta[CameraError::kFocal] = other.lens.focal - camera.lens.focal;
+  delta[CameraError::kRadial] = other.lens.radial - camera.lens.radial;
+  delta.segment<2>(CameraError::kCentre) = other.lens.centre_px - camera.lens.centre_px;
   for (std::size_t i = 0; i < features.size(); ++i) {
     const FeatureState &a = features[i], &b = others[i];
     if (a.kind == FeatureKind::kPoint) {

@@ -169,8 +169,8 @@ class Simulation {
         Eigen::Vector3d::Constant(options_.metric ? 0.01 : 0.0),
         Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
         Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
-    Eigen::VectorXd error(12);
-    for (int i = 0; i < 12; ++i) error[i] = random_.normal(sigma[i]);
+    Eigen::VectorXd error = Eigen::VectorXd::Zero(CameraError::kSize);
+    for (int i = 0; i < CameraError::kMotionSize; ++i) error[i] = random_.normal(sigma[i]);
     CameraState guess = truth_;
     std::vector<FeatureState> none;
     applyError(error, guess, none);

@@ -32,8 +32,14 @@ MapFileContent smallMap() {
   content.template_size_px = 11;
   content.source_patch_size_px = 15;
   content.scale_source = 2;
-  Ekf filter{FilterOptions()};
-  filter.reset(CameraState(), 0.01 * Eigen::Matrix<double, 12, 12>::Identity());
+  FilterOptions options;
+  options.initial_sigma_focal = options.initial_sigma_radial = 0.01;
+  options.initial_sigma_centre_px = 3.0;
+  Ekf filter(options);
+  CameraState start;
+  start.readout_s = 0.02;
+  start.lens = {0.005, -0.01, {1.5, -2.5}};
+  filter.reset(start, 0.01 * Eigen::Matrix<double, 12, 12>::Identity());
   const CameraModel camera(content.camera);
   filter.addInverseDepthFeature(camera, {100.25, 80.5}, 0.5, 0.1);
   filter.addPointFeature({0.3, -0.2, 2.0}, 0.01 * Eigen::Matrix3d::Identity());
@@ -105,6 +111,10 @@ TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
   const MapFileContent read = readMapFile(path_);
   EXPECT_EQ(read.camera.name, "left");
   EXPECT_EQ(read.camera.distortion, written.camera.distortion);
+  EXPECT_EQ(read.camera_state.readout_s, 0.02);
+  EXPECT_EQ(read.camera_state.lens.focal, 0.005);
+  EXPECT_EQ(read.camera_state.lens.radial, -0.01);
+  EXPECT_EQ(read.camera_state.lens.centre_px, Eigen::Vector2d(1.5, -2.5));
   EXPECT_EQ(read.covariance, written.covariance);
   EXPECT_EQ(read.next_id, 4);
   EXPECT_EQ(read.scale_source, 2);
@@ -196,8 +206,8 @@ TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
   bytes[bytes.size() / 2] ^= 1;
   expectRefused(bytes, "damaged");
   bytes = serializeMap(smallMap());
-  setNumber(&bytes, 8, 2, 4);
-  expectRefused(bytes, "version 2");
+  setNumber(&bytes, 8, 3, 4);
+  expectRefused(bytes, "version 3");
   bytes = serializeMap(smallMap());
   double infinity = std::numeric_limits<double>::infinity();
   std::memcpy(&bytes[bytes.size() - 8], &infinity, 8);
@@ -210,6 +220,33 @@ TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
   setNumber(&bytes, 24, std::uint64_t{1} << 60, 8);
   seal(&bytes);
   expectRefused(bytes, "name");
+}
+
+TEST_F(MapFile, AMapOfVersion1IsReadAndItsCalibrationIsInDoubtAnew) {
+  const MapFileContent content = smallMap();
+  std::string bytes = serializeMap(content);
+  // What version 1 does not have: five numbers of the camera and their rows of the covariance.
+  std::string readout(8, 0);
+  std::memcpy(&readout[0], &content.camera_state.readout_s, 8);
+  bytes.erase(bytes.find(readout), 5 * 8);
+  const Eigen::Index n = content.covariance.rows();
+  bytes.resize(bytes.size() - 8 * static_cast<std::size_t>(n * (n + 1) / 2));
+  const auto isCalibration = [](Eigen::Index i) { return i >= 12 && i < 17; };
+  for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index i = j; i < n; ++i)
+      if (!isCalibration(i) && !isCalibration(j))
+        bytes.append(reinterpret_cast<const char*>(&content.covariance(i, j)), 8);
+  setNumber(&bytes, 8, 1, 4);
+  seal(&bytes);
+  const MapFileContent read = parseMap(bytes);
+  EXPECT_EQ(read.camera_state.position_world, content.camera_state.position_world);
+  EXPECT_EQ(read.camera_state.readout_s, 0.0);
+  EXPECT_EQ(read.camera_state.lens.focal, 0.0);
+  Eigen::MatrixXd expected = content.covariance;
+  expected.middleRows<5>(12).setZero();
+  expected.middleCols<5>(12).setZero();
+  expected.diagonal().segment<5>(12) = calibrationSigmas(FilterOptions()).array().square();
+  EXPECT_EQ(read.covariance, expected);
 }
 
 // Deterministic fuzz: files with bytes changed, numbers replaced, parts removed or doubled, with a
@@ -285,6 +322,19 @@ TEST(EkfRestore, RefusesWhatDoesNotFitTogetherAndChangesNothing) {
   bad = good;
   bad.camera_state.q_world_camera.w() = 2.0;
   expectThrow(bad);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  bad = good;
+  bad.camera_state.readout_s = std::numeric_limits<double>::infinity();
+  expectThrow(bad);
+  bad = good;
+  bad.camera_state.lens.focal = nan;
+  expectThrow(bad);
+  bad = good;
+  bad.camera_state.lens.radial = nan;
+  expectThrow(bad);
+  bad = good;
+  bad.camera_state.lens.centre_px.y() = nan;
+  expectThrow(bad);
   bad = good;
   bad.features[1].inverse_depth = 0.0;
   expectThrow(bad);
@@ -292,7 +342,7 @@ TEST(EkfRestore, RefusesWhatDoesNotFitTogetherAndChangesNothing) {
   EXPECT_EQ(filter.nextId(), good.next_id);
 }
 
-TEST(EkfRestore, ARelocatedCameraHasNothingInCommonWithTheMap) {
+TEST(EkfRestore, ARelocatedCameraHasNothingButItsCalibrationInCommonWithTheMap) {
   const MapFileContent content = smallMap();
   Ekf filter{FilterOptions()};
   filter.restore(content.camera_state, content.features, content.covariance, content.next_id);
@@ -300,13 +350,17 @@ TEST(EkfRestore, ARelocatedCameraHasNothingInCommonWithTheMap) {
   camera.position_world << 1.0, 2.0, 3.0;
   filter.relocateCamera(camera, 0.04 * Eigen::Matrix<double, 12, 12>::Identity());
   const Eigen::MatrixXd P = filter.covariance();
-  const int map_size = filter.stateSize() - 12;
+  const int rest = filter.stateSize() - 12;
   EXPECT_EQ(filter.camera().position_world, camera.position_world);
+  EXPECT_EQ(filter.camera().readout_s, content.camera_state.readout_s);
+  EXPECT_EQ(filter.camera().lens.focal, content.camera_state.lens.focal);
+  EXPECT_EQ(filter.camera().lens.radial, content.camera_state.lens.radial);
+  EXPECT_EQ(filter.camera().lens.centre_px, content.camera_state.lens.centre_px);
   EXPECT_EQ(P.topLeftCorner(12, 12), 0.04 * Eigen::MatrixXd::Identity(12, 12));
-  EXPECT_TRUE(P.topRightCorner(12, map_size).isZero(0.0));
-  EXPECT_TRUE(P.bottomLeftCorner(map_size, 12).isZero(0.0));
-  EXPECT_EQ(P.bottomRightCorner(map_size, map_size),
-            content.covariance.bottomRightCorner(map_size, map_size));
+  EXPECT_TRUE(P.topRightCorner(12, rest).isZero(0.0));
+  EXPECT_TRUE(P.bottomLeftCorner(rest, 12).isZero(0.0));
+  ASSERT_FALSE(P.block(12, CameraError::kSize, 5, rest - 5).isZero(1e-6));
+  EXPECT_EQ(P.bottomRightCorner(rest, rest), content.covariance.bottomRightCorner(rest, rest));
 }
 
 }  // namespace

@@ -8,6 +8,15 @@
 
 namespace active_matching_slam {
 
+/// What a calibration got wrong, as far as images tell: with n the offset of a pixel from the image
+/// centre over the focal length, the pixel moves to
+/// centre + centre_px + (1 + focal + radial |n|^2) (pixel - centre).
+struct LensCorrection {
+  double focal = 0.0;   ///< relative growth of the focal length
+  double radial = 0.0;  ///< relative growth at |n| = 1, beyond that of the focal length
+  Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
+};
+
 /// Projection between points in the camera's optical frame (x right, y down, z forward; REP 103)
 /// and pixels of the raw image (u right, v down, pixel centres at integers), through the lens
 /// distortion. Immutable; safe to share between threads.
@@ -20,12 +29,19 @@ class CameraModel {
   int width() const { return calibration_.width; }
   int height() const { return calibration_.height; }
 
+  /// The same camera with `correction` in place of the one that it has.
+  CameraModel corrected(const LensCorrection& correction) const;
+
   /// Pixel of a point (any length, homogeneous scale does not matter) in the camera frame. Empty
   /// when the point is behind the camera or outside the field where the distortion model is
   /// one-to-one. `d_pixel_d_point`, when given, receives the 2 x 3 Jacobian.
   std::optional<Eigen::Vector2d> project(
       const Eigen::Vector3d& point_camera,
       Eigen::Matrix<double, 2, 3>* d_pixel_d_point = nullptr) const;
+
+  /// How a pixel that project() returned answers to the correction: columns focal, radial, centre
+  /// (2).
+  Eigen::Matrix<double, 2, 4> pixelByCorrection(const Eigen::Vector2d& pixel) const;
 
   /// Unit bearing in the camera frame of a pixel. Empty where the model can't be inverted.
   /// `d_bearing_d_pixel`, when given, receives the 3 x 2 Jacobian.
@@ -39,6 +55,10 @@ class CameraModel {
   }
 
  private:
+  /// Pixel of the calibration alone to the corrected one, with the 2 x 2 Jacobian when asked for.
+  Eigen::Vector2d correct(const Eigen::Vector2d& pixel, Eigen::Matrix2d* jacobian) const;
+  /// Inverse of correct(); empty where there is none.
+  std::optional<Eigen::Vector2d> uncorrect(const Eigen::Vector2d& pixel) const;
   /// Factor s(r^2) between ideal and radially distorted image coordinates, and its derivative.
   double radialScale(double r2, double* d_scale_d_r2) const;
   /// Ideal to distorted normalised coordinates, with the 2 x 2 Jacobian when asked for.
@@ -52,6 +72,7 @@ class CameraModel {
   double findMaximumRadius() const;
 
   CameraCalibration calibration_;
+  LensCorrection correction_;
   /// k1 k2 p1 p2 k3 k4 k5 k6 (equidistant: k1 k2 k3 k4 first); what the model lacks is zero.
   std::array<double, 8> k_{};
   bool has_tangential_ = false;

@@ -14,14 +14,18 @@ namespace active_matching_slam {
 struct BundleObservation {
   int feature = -1;
   Eigen::Vector2d pixel;
+  /// How the pixel answers to the calibration, in the order of CameraError from kReadout on.
+  Eigen::Matrix<double, 2, CameraError::kCalibrationSize> d_calibration =
+      Eigen::Matrix<double, 2, CameraError::kCalibrationSize>::Zero();
 };
 
-/// Cameras and features to be adjusted together. The first camera is the world: it stays at the
-/// origin, and every feature is anchored there (inverse depth).
+/// Cameras, features and calibration to be adjusted together. The first camera is the world: it
+/// stays at the origin, and every feature is anchored there (inverse depth).
 struct Bundle {
-  std::vector<CameraState> cameras;  ///< of velocities nothing is read or changed
+  std::vector<CameraState> cameras;  ///< of all but the pose nothing is read or changed
   std::vector<FeatureState> features;
   std::vector<std::vector<BundleObservation>> observations;  ///< one list a camera
+  CalibrationVector calibration = CalibrationVector::Zero();
 };
 
 struct BundleOptions {
@@ -30,21 +34,23 @@ struct BundleOptions {
   double inverse_depth = 1.0;        ///< prior mean of every inverse depth; it sets the scale
   double sigma_inverse_depth = 0.5;  ///< and its standard deviation
   double minimum_inverse_depth = 1e-4;
+  CalibrationVector sigma_calibration = CalibrationVector::Zero();  ///< prior, about zero
   int max_iterations = 20;
   /// Ends where steps like the last, as many as are left, would not bring the cost below.
   double hopeless_cost = std::numeric_limits<double>::infinity();
 };
 
-/// Levenberg-Marquardt over all cameras but the first, all bearings and inverse depths, the
-/// features eliminated first (Triggs et al. 1999, section 6.1), image points weighted by Cauchy's
-/// function. Returns the cost reached: minus twice the logarithm of the posterior, up to a
-/// constant.
+/// Levenberg-Marquardt over all cameras but the first, the calibration, all bearings and inverse
+/// depths, the features eliminated first (Triggs et al. 1999, section 6.1), image points weighted
+/// by Cauchy's function. Returns the cost reached: minus twice the logarithm of the posterior, up
+/// to a constant.
 double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle);
 
 /// Covariance at a minimum, first order, of the cameras from `first_camera` on (position and
-/// rotation, 6 each, as in CameraError) and then of all features (bearing and inverse depth, 3
-/// each). Scale is taken as known to `relative_scale_sigma`: the mean logarithm of the inverse
-/// depths is the unit.
+/// rotation, 6 each, as in CameraError), of the calibration and then of all features (bearing and
+/// inverse depth, 3 each). Of the lens nothing is learnt: it is as uncertain as before and makes
+/// the rest so (a consider parameter; Schmidt 1966). Scale is taken as known to
+/// `relative_scale_sigma`: the mean logarithm of the inverse depths is the unit.
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera,
                                  double relative_scale_sigma);

@@ -44,8 +44,8 @@ class Ekf {
   /// Run-time changes; throws like the constructor.
   void setOptions(const FilterOptions& options);
 
-  /// Empties the map and puts the camera at `camera` with `covariance` (12 x 12, CameraError
-  /// order).
+  /// Empties the map and puts the camera at `camera` with `covariance` of its motion (12 x 12,
+  /// CameraError order); its calibration is as uncertain as the options say.
   void reset(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& covariance);
 
   /// Takes over a saved state: camera, features by ascending id (their offsets are computed anew)
@@ -54,10 +54,10 @@ class Ekf {
   void restore(const CameraState& camera, const std::vector<FeatureState>& features,
                const Eigen::MatrixXd& covariance, FeatureId next_id);
 
-  /// The camera is somewhere else, known by other means: its old state and all that it had in common
-  /// with the map are forgotten; the map stays. `covariance` as for reset().
-  void relocateCamera(const CameraState& camera,
-                      const Eigen::Matrix<double, 12, 12>& covariance);
+  /// The camera is somewhere else, known by other means: its old motion and all that it had in
+  /// common with the map are forgotten; the map and what is known of the calibration stay.
+  /// `covariance` as for reset().
+  void relocateCamera(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& covariance);
 
   /// Moves on by `interval_s` >= 0 with constant velocity (eq. 3.6-3.8).
   void predict(double interval_s);
@@ -80,8 +80,8 @@ class Ekf {
                       const std::vector<FeatureMeasurement>& measurements);
 
   /// Takes the present map's scale as the unit: fuses, without moving the mean, that the mean
-  /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this only
-  /// chooses the gauge, and keeps what follows from changing the unit.
+  /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this
+  /// only chooses the gauge, and keeps what follows from changing the unit.
   void fixScale(double relative_sigma);
 
   /// Multiplies all lengths (map, position, velocity and their covariances) by `factor` > 0.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "active_matching_slam/filter/camera_state.h"
+
 namespace active_matching_slam {
 
 /// Settings of the EKF. Units: m stands for the map unit when scale is free.
@@ -9,6 +11,11 @@ struct FilterOptions {
   double sigma_px = 0.45;                         ///< measurement noise, per axis
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
+  /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
+  double initial_sigma_readout_s = 0.01;
+  double initial_sigma_focal = 0.0;   ///< relative
+  double initial_sigma_radial = 0.0;  ///< see LensCorrection
+  double initial_sigma_centre_px = 0.0;
   double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
   double initial_sigma_inverse_depth = 0.5;  ///< infinity within 2 sigma (Civera 2008)
   double linearity_threshold = 0.02;         ///< inverse depth -> point below (Civera 2008)
@@ -16,6 +23,9 @@ struct FilterOptions {
   int update_iterations =
       1;  ///< linearisations of an update at most, 1 to 10; repeated when needed
 };
+
+/// Of the prior, in the order of CameraError from kReadout on.
+CalibrationVector calibrationSigmas(const FilterOptions& options);
 
 /// Throws std::invalid_argument with name, value and allowed range.
 void checkFilterOptions(const FilterOptions& options);

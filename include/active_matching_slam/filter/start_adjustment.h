@@ -49,7 +49,8 @@ class StartAdjustment {
   /// Joins to the last image features that it showed first, numbered above all before.
   void addFirstSights(const std::vector<FeatureMeasurement>& measurements);
 
-  /// The adjusted state when it is time for one and the images leave no doubt.
+  /// The adjusted state when it is time for one and the images leave no doubt. `model` as
+  /// calibrated; the readout is adjusted too.
   std::optional<AdjustedStart> adjust(const CameraModel& model, const Ekf& filter);
 
  private:
@@ -58,11 +59,13 @@ class StartAdjustment {
     double interval_s = 0.0;
     CameraState camera;
     std::vector<FeatureMeasurement> measurements;  ///< ascending id
+    /// Speed [px/s] of each of them, by the images next to this one that show it; zero: none does.
+    std::vector<Eigen::Vector2d> speeds;
   };
 
   void thinOut();
   std::optional<double> parallaxToFirst(const CameraModel& model, const Image& image) const;
-  Bundle makeBundle(const Ekf& filter, std::vector<FeatureId>* ids) const;
+  Bundle makeBundle(const CameraModel& model, const Ekf& filter, std::vector<FeatureId>* ids) const;
   std::optional<AdjustedStart> makeState(const CameraModel& model, const Ekf& filter,
                                          const BundleOptions& options, const Bundle& bundle,
                                          const std::vector<FeatureId>& ids) const;

@@ -58,6 +58,18 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.filter.initial_sigma_velocity_mps, 1e-3, 100.0);
   visit(F{"filter/initial_sigma_angular_velocity_rps", "at start, per axis [rad/s]", true},
         o.filter.initial_sigma_angular_velocity_rps, 1e-3, 100.0);
+  visit(F{"filter/initial_sigma_readout_s",
+          "trust in a global shutter: of the time from first row to last [s]", true},
+        o.filter.initial_sigma_readout_s, 0.0, 0.1);
+  visit(F{"filter/initial_sigma_focal", "trust in the calibration: of the focal length, relative",
+          true},
+        o.filter.initial_sigma_focal, 0.0, 0.2);
+  visit(F{"filter/initial_sigma_radial",
+          "trust in the calibration: of radial distortion at 45 degrees, relative", true},
+        o.filter.initial_sigma_radial, 0.0, 0.2);
+  visit(F{"filter/initial_sigma_centre_px",
+          "trust in the calibration: of the image centre, per axis [px]", true},
+        o.filter.initial_sigma_centre_px, 0.0, 100.0);
   visit(F{"filter/initial_inverse_depth",
           "prior of a new feature; fixes the map unit when scale is "
           "free [1/m]",
