@@ -68,11 +68,11 @@ TEST_P(EveryMotion, IsTheSameForTheSameSeed) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Motions, EveryMotion,
-                         ::testing::Values("slow", "jerky", "sideways", "forward", "circle",
-                                           "still", "shake"),
+                         ::testing::Values("slow", "jerky", "sideways", "forward", "sweep",
+                                           "circle", "still", "shake"),
                          [](const auto& info) { return info.param; });
 
-TEST(Motions, EveryListedNameIsTested) { EXPECT_EQ(motionChoices().size(), 7u); }
+TEST(Motions, EveryListedNameIsTested) { EXPECT_EQ(motionChoices().size(), 8u); }
 
 TEST(Motions, SlowComesBackToTheStart) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -117,6 +117,20 @@ TEST(Motions, JerkyIsHastyAndSlowIsCalm) {
   }
 }
 
+TEST(Motions, SweepLooksToBothSidesOfItsWay) {
+  const Stage stage = wideStage();
+  const Motion motion = createMotion("sweep", stage, 3);
+  double left = 0.0, right = 0.0;  // of where it looks
+  for (double t = 0.0; t < 15.0; t += 0.1) {
+    const double side =
+        (stage.T_world_start.inverse() * motion.at(t).T_world_camera).linear()(0, 2);
+    left = std::min(left, side);
+    right = std::max(right, side);
+  }
+  EXPECT_LT(left, -std::sin(M_PI / 3.0));
+  EXPECT_GT(right, std::sin(M_PI / 3.0));
+}
+
 TEST(Motions, StillDoesNotMove) {
   const Motion motion = createMotion("still", wideStage(), 2);
   EXPECT_EQ(motion.at(17.0).T_world_camera.matrix(), motion.at(0.0).T_world_camera.matrix());
@@ -129,7 +143,7 @@ TEST(Motions, AnUnknownNameIsRefusedWithTheList) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(
         error.what(),
-        "motion is 'sprint', must be one of slow, jerky, sideways, forward, circle, still, "
+        "motion is 'sprint', must be one of slow, jerky, sideways, forward, sweep, circle, still, "
         "shake");
   }
 }
