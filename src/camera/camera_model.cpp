@@ -147,21 +147,19 @@ std::optional<Eigen::Vector2d> CameraModel::project(
   const double inverse_z = 1.0 / point_camera.z();
   const Eigen::Vector2d ideal = point_camera.head<2>() * inverse_z;
   if (!(ideal.squaredNorm() <= max_radius2_)) return std::nullopt;
-  Eigen::Matrix2d jacobian;
-  const Eigen::Vector2d distorted = distort(ideal, d_pixel_d_point ? &jacobian : nullptr);
+  Eigen::Matrix2d d_distorted, d_corrected;
+  const Eigen::Vector2d corrected =
+      correct(distort(ideal, d_pixel_d_point ? &d_distorted : nullptr), &d_corrected);
+  if (!(d_corrected.determinant() > 0.0 && d_corrected.trace() > 0.0)) return std::nullopt;
   if (d_pixel_d_point) {
+    Eigen::Matrix2d jacobian = d_corrected * d_distorted;
     jacobian.row(0) *= calibration_.fx * inverse_z;
     jacobian.row(1) *= calibration_.fy * inverse_z;
     d_pixel_d_point->leftCols<2>() = jacobian;
     d_pixel_d_point->col(2) = -jacobian * ideal;
   }
-  const Eigen::Vector2d pixel(calibration_.fx * distorted.x() + calibration_.cx,
-                              calibration_.fy * distorted.y() + calibration_.cy);
-  Eigen::Matrix2d d_corrected;
-  const Eigen::Vector2d corrected = correct(pixel, &d_corrected);
-  if (!(d_corrected.determinant() > 0.0 && d_corrected.trace() > 0.0)) return std::nullopt;
-  if (d_pixel_d_point) *d_pixel_d_point = d_corrected * *d_pixel_d_point;
-  return corrected;
+  return Eigen::Vector2d(calibration_.fx * corrected.x() + calibration_.cx,
+                         calibration_.fy * corrected.y() + calibration_.cy);
 }
 
 CameraModel CameraModel::corrected(const LensCorrection& correction) const {
@@ -170,42 +168,42 @@ CameraModel CameraModel::corrected(const LensCorrection& correction) const {
   return camera;
 }
 
-Eigen::Vector2d CameraModel::correct(const Eigen::Vector2d& pixel,
+Eigen::Vector2d CameraModel::correct(const Eigen::Vector2d& distorted,
                                      Eigen::Matrix2d* jacobian) const {
-  const Eigen::Vector2d centre(calibration_.cx, calibration_.cy);
-  const Eigen::Vector2d offset = pixel - centre;
-  const Eigen::Vector2d n(offset.x() / calibration_.fx, offset.y() / calibration_.fy);
-  const double scale = 1.0 + correction_.focal + correction_.radial * n.squaredNorm();
-  if (jacobian) {
-    const Eigen::RowVector2d d_scale(2.0 * correction_.radial * n.x() / calibration_.fx,
-                                     2.0 * correction_.radial * n.y() / calibration_.fy);
-    *jacobian = scale * Eigen::Matrix2d::Identity() + offset * d_scale;
-  }
-  return centre + correction_.centre_px + scale * offset;
+  const auto& [focal, radial, centre] = correction_;
+  const double scale = 1.0 + focal + radial * distorted.squaredNorm();
+  *jacobian =
+      scale * Eigen::Matrix2d::Identity() + 2.0 * radial * distorted * distorted.transpose();
+  return centre + scale * distorted;
 }
 
-std::optional<Eigen::Vector2d> CameraModel::uncorrect(const Eigen::Vector2d& pixel) const {
-  Eigen::Vector2d solution = pixel - correction_.centre_px;
+std::optional<Eigen::Vector2d> CameraModel::uncorrect(const Eigen::Vector2d& corrected) const {
+  Eigen::Vector2d solution = corrected - correction_.centre;
   for (int iteration = 0; iteration < 20; ++iteration) {
     Eigen::Matrix2d jacobian;
-    const Eigen::Vector2d residual = correct(solution, &jacobian) - pixel;
+    const Eigen::Vector2d residual = correct(solution, &jacobian) - corrected;
     if (!(jacobian.determinant() > 0.0)) return std::nullopt;
-    if (residual.cwiseAbs().maxCoeff() <= 1e-12 * (1.0 + pixel.cwiseAbs().maxCoeff()))
+    if (residual.squaredNorm() <= kTolerance * kTolerance * (1.0 + corrected.squaredNorm()))
       return solution;
     solution -= jacobian.inverse() * residual;
   }
   return std::nullopt;
 }
 
+Eigen::Vector2d CameraModel::normalised(const Eigen::Vector2d& pixel) const {
+  return {(pixel.x() - calibration_.cx) / calibration_.fx,
+          (pixel.y() - calibration_.cy) / calibration_.fy};
+}
+
 Eigen::Matrix<double, 2, 4> CameraModel::pixelByCorrection(const Eigen::Vector2d& pixel) const {
   Eigen::Matrix<double, 2, 4> J = Eigen::Matrix<double, 2, 4>::Zero();
   J.rightCols<2>().setIdentity();
-  if (const auto plain = uncorrect(pixel)) {
-    const Eigen::Vector2d offset = *plain - Eigen::Vector2d(calibration_.cx, calibration_.cy);
-    J.col(0) = offset;
-    J.col(1) = offset * (std::pow(offset.x() / calibration_.fx, 2) +
-                         std::pow(offset.y() / calibration_.fy, 2));
+  if (const auto distorted = uncorrect(normalised(pixel))) {
+    J.col(0) = *distorted;
+    J.col(1) = distorted->squaredNorm() * *distorted;
   }
+  J.row(0) *= calibration_.fx;
+  J.row(1) *= calibration_.fy;
   return J;
 }
 
@@ -263,26 +261,23 @@ std::optional<Eigen::Vector2d> CameraModel::undistort(const Eigen::Vector2d& dis
 
 std::optional<Eigen::Vector3d> CameraModel::unproject(
     const Eigen::Vector2d& pixel, Eigen::Matrix<double, 3, 2>* d_bearing_d_pixel) const {
-  const auto plain = uncorrect(pixel);
-  if (!plain) return std::nullopt;
-  const Eigen::Vector2d distorted((plain->x() - calibration_.cx) / calibration_.fx,
-                                  (plain->y() - calibration_.cy) / calibration_.fy);
-  const std::optional<Eigen::Vector2d> ideal = undistort(distorted);
+  const std::optional<Eigen::Vector2d> distorted = uncorrect(normalised(pixel));
+  if (!distorted) return std::nullopt;
+  const std::optional<Eigen::Vector2d> ideal = undistort(*distorted);
   if (!ideal || !(ideal->squaredNorm() <= max_radius2_)) return std::nullopt;
   const double inverse_norm = 1.0 / std::sqrt(ideal->squaredNorm() + 1.0);
   const Eigen::Vector3d bearing = Eigen::Vector3d(ideal->x(), ideal->y(), 1.0) * inverse_norm;
   if (d_bearing_d_pixel) {
-    Eigen::Matrix2d d_distorted_d_ideal;
-    distort(*ideal, &d_distorted_d_ideal);
-    Eigen::Matrix2d d_ideal_d_pixel = d_distorted_d_ideal.inverse();
+    Eigen::Matrix2d d_distorted, d_corrected;
+    distort(*ideal, &d_distorted);
+    correct(*distorted, &d_corrected);
+    Eigen::Matrix2d d_ideal_d_pixel = (d_corrected * d_distorted).inverse();
     d_ideal_d_pixel.col(0) /= calibration_.fx;
     d_ideal_d_pixel.col(1) /= calibration_.fy;
     Eigen::Matrix<double, 3, 2> d_bearing_d_ideal = -bearing * bearing.head<2>().transpose();
     d_bearing_d_ideal(0, 0) += 1.0;
     d_bearing_d_ideal(1, 1) += 1.0;
-    Eigen::Matrix2d d_corrected;
-    correct(*plain, &d_corrected);
-    *d_bearing_d_pixel = inverse_norm * d_bearing_d_ideal * d_ideal_d_pixel * d_corrected.inverse();
+    *d_bearing_d_pixel = inverse_norm * d_bearing_d_ideal * d_ideal_d_pixel;
   }
   return bearing;
 }

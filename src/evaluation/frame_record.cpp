@@ -12,6 +12,8 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.pose = {frame.stamp_s, frame.camera.poseWorldCamera()};
   record.speed = frame.camera.velocity_world.norm();
   record.pose_covariance = frame.camera_covariance.topLeftCorner<6, 6>();
+  record.readout_s = frame.camera.readout_s;
+  record.lens = frame.camera.lens;
   record.nis = frame.nis;
   record.nis_degrees = frame.nis_degrees;
   record.map_features = static_cast<int>(frame.features.size());

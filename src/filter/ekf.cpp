@@ -22,7 +22,7 @@ void Ekf::setOptions(const FilterOptions& options) {
   options_ = options;
 }
 
-void Ekf::reset(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& covariance) {
+void Ekf::reset(const CameraState& camera, const MotionCovariance& covariance) {
   camera_ = camera;
   camera_.q_world_camera.normalize();
   features_.clear();
@@ -45,12 +45,12 @@ void Ekf::predict(double interval_s) {
   // P <- F P F^T touches the motion's rows and columns only.
   auto P = covariance_.view();
   const int rest = covariance_.size() - CameraError::kMotionSize;
-  Eigen::Matrix<double, 12, 12> F = Eigen::Matrix<double, 12, 12>::Identity();
+  MotionCovariance F = MotionCovariance::Identity();
   F.block<3, 3>(CameraError::kPosition, CameraError::kVelocity) =
       interval_s * Eigen::Matrix3d::Identity();
   F.block<3, 3>(CameraError::kRotation, CameraError::kAngularVelocity) = K;
-  auto P_camera = P.topLeftCorner<12, 12>();
-  Eigen::Matrix<double, 12, 12> predicted = F * P_camera * F.transpose();
+  auto P_camera = P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>();
+  MotionCovariance predicted = F * P_camera * F.transpose();
 
   // Impulses V = a dt, Omega = alpha dt enter like the velocities themselves (eq. 3.7).
   Eigen::Matrix<double, 12, 6> G = F.rightCols<6>();
@@ -69,6 +69,16 @@ void Ekf::predict(double interval_s) {
         K * motion_rest.col(j).segment<3>(CameraError::kAngularVelocity);
   }
   P.bottomLeftCorner(rest, CameraError::kMotionSize) = motion_rest.transpose();
+}
+
+void Ekf::doubtVelocity(double share) {
+  Eigen::Matrix<double, 6, 2> lost = Eigen::Matrix<double, 6, 2>::Zero();
+  lost.topLeftCorner<3, 1>() = (1.0 - share) * camera_.velocity_world;
+  lost.bottomRightCorner<3, 1>() = (1.0 - share) * camera_.angular_velocity_camera;
+  camera_.velocity_world *= share;
+  camera_.angular_velocity_camera *= share;
+  covariance_.view().block<6, 6>(CameraError::kVelocity, CameraError::kVelocity) +=
+      lost * lost.transpose();
 }
 
 void Ekf::rescale(double factor) {

@@ -22,7 +22,7 @@ void checkCamera(const CameraState& camera) {
   if (!camera.position_world.allFinite() || !camera.velocity_world.allFinite() ||
       !camera.angular_velocity_camera.allFinite() || !camera.q_world_camera.coeffs().allFinite() ||
       !std::isfinite(camera.readout_s) || !std::isfinite(camera.lens.focal) ||
-      !std::isfinite(camera.lens.radial) || !camera.lens.centre_px.allFinite())
+      !std::isfinite(camera.lens.radial) || !camera.lens.centre.allFinite())
     refuse("the camera is not finite");
   if (std::abs(camera.q_world_camera.norm() - 1.0) > kUnitTolerance)
     refuse("the camera's quaternion has length " + std::to_string(camera.q_world_camera.norm()) +
@@ -94,8 +94,7 @@ void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& fe
   next_id_ = next_id;
 }
 
-void Ekf::relocateCamera(const CameraState& camera,
-                         const Eigen::Matrix<double, 12, 12>& covariance) {
+void Ekf::relocateCamera(const CameraState& camera, const MotionCovariance& covariance) {
   const CameraState before = camera_;
   camera_ = camera;
   camera_.q_world_camera.normalize();
@@ -103,7 +102,8 @@ void Ekf::relocateCamera(const CameraState& camera,
   camera_.lens = before.lens;
   auto P = covariance_.view();
   const int rest = covariance_.size() - CameraError::kMotionSize;
-  P.topLeftCorner<12, 12>() = 0.5 * (covariance + covariance.transpose());
+  P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() =
+      0.5 * (covariance + covariance.transpose());
   P.topRightCorner(CameraError::kMotionSize, rest).setZero();
   P.bottomLeftCorner(rest, CameraError::kMotionSize).setZero();
 }

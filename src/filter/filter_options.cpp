@@ -28,7 +28,7 @@ void checkNotNegative(const std::string& name, double value) {
 CalibrationVector calibrationSigmas(const FilterOptions& options) {
   CalibrationVector sigmas;
   sigmas << options.initial_sigma_readout_s, options.initial_sigma_focal,
-      options.initial_sigma_radial, Eigen::Vector2d::Constant(options.initial_sigma_centre_px);
+      options.initial_sigma_radial, Eigen::Vector2d::Constant(options.initial_sigma_centre);
   return sigmas;
 }
 
@@ -42,7 +42,7 @@ void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("initial_sigma_readout_s", options.initial_sigma_readout_s);
   checkNotNegative("initial_sigma_focal", options.initial_sigma_focal);
   checkNotNegative("initial_sigma_radial", options.initial_sigma_radial);
-  checkNotNegative("initial_sigma_centre_px", options.initial_sigma_centre_px);
+  checkNotNegative("initial_sigma_centre", options.initial_sigma_centre);
   checkPositive("initial_inverse_depth", options.initial_inverse_depth);
   checkPositive("initial_sigma_inverse_depth", options.initial_sigma_inverse_depth);
   checkNotNegative("linearity_threshold", options.linearity_threshold);

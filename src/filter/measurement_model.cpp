@@ -76,7 +76,7 @@ std::optional<FeatureProjection> projectFeature(const CameraModel& model, const 
     if (!projection) return projection;
     v = std::clamp(projection->pixel.y(), 0.0, static_cast<double>(model.height()));
   }
-  if (guesses == 1) row = poseOfRow(model, camera, v);
+  if (guesses == 1) row = poseOfRow(model, camera, v);  // how it answers to the readout
   projection->d_camera = d_pose * row.d_camera;
   projection->d_camera.rightCols<4>() = model.pixelByCorrection(projection->pixel);
   if (v != projection->pixel.y()) return projection;

@@ -30,7 +30,7 @@ void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& cam
   camera.readout_s += delta[CameraError::kReadout];
   camera.lens.focal += delta[CameraError::kFocal];
   camera.lens.radial += delta[CameraError::kRadial];
-  camera.lens.centre_px += delta.segment<2>(CameraError::kCentre);
+  camera.lens.centre += delta.segment<2>(CameraError::kCentre);
   camera.q_world_camera = (rotationFromVector(theta) * camera.q_world_camera).normalized();
   for (FeatureState& feature : features) {
     if (feature.kind == FeatureKind::kPoint) {

@@ -127,7 +127,7 @@ void write(const CameraState& camera, Writer* out) {
   out->reals(camera.velocity_world);
   out->reals(camera.angular_velocity_camera);
   for (double value : {camera.readout_s, camera.lens.focal, camera.lens.radial}) out->real(value);
-  out->reals(camera.lens.centre_px);
+  out->reals(camera.lens.centre);
 }
 
 CameraState readCameraState(std::uint32_t version, Reader* in) {
@@ -139,7 +139,7 @@ CameraState readCameraState(std::uint32_t version, Reader* in) {
   if (version < 2) return camera;
   for (double* value : {&camera.readout_s, &camera.lens.focal, &camera.lens.radial})
     *value = in->real();
-  in->reals(camera.lens.centre_px);
+  in->reals(camera.lens.centre);
   return camera;
 }
 

@@ -112,6 +112,11 @@ ams_msgs::MatchingStatistics toStatisticsMsg(const TrackedFrame& frame,
   message.information_bits_left = finiteOrZero(matching.information_bits_end);
   message.nis = finiteOrZero(frame.nis);
   message.nis_degrees = frame.nis_degrees;
+  message.readout_s = frame.camera.readout_s;
+  message.lens_focal = frame.camera.lens.focal;
+  message.lens_radial = frame.camera.lens.radial;
+  message.lens_centre_x = frame.camera.lens.centre.x();
+  message.lens_centre_y = frame.camera.lens.centre.y();
   message.features = static_cast<std::uint32_t>(frame.features.size());
   message.features_started = frame.features_started;
   message.features_converted = frame.features_converted;

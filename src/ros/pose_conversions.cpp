@@ -63,7 +63,7 @@ geometry_msgs::TransformStamped toTransformMsg(const Eigen::Isometry3d& T_parent
   return message;
 }
 
-RigidBodyState rigidBodyState(const CameraState& camera, const Matrix12d& covariance,
+RigidBodyState rigidBodyState(const CameraState& camera, const MotionCovariance& covariance,
                               const Eigen::Isometry3d& T_camera_body) {
   const Eigen::Isometry3d T_world_camera = camera.poseWorldCamera();
   const Eigen::Matrix3d R_body_world =

@@ -60,13 +60,20 @@ MeasurementPrior conditionOnImageMotion(
   Eigen::MatrixXd P = prior.S;  // without the noise of a match
   P.diagonal().array() -= prior.noise_variance_px2;
   const Eigen::MatrixX3d PA = P * A.transpose();
-  Eigen::Matrix3d V = A * PA;
-  V.diagonal().array() += variance;
-  const Eigen::LLT<Eigen::Matrix3d> factor(V);
+  const Eigen::Matrix3d V = A * PA, noise = variance * Eigen::Matrix3d::Identity();
   MeasurementPrior conditioned = prior;
-  if (factor.info() != Eigen::Success) return conditioned;
-  conditioned.z += PA * factor.solve(common);
-  const Eigen::Matrix3Xd root = factor.matrixL().solve(PA.transpose());
+  const Eigen::LLT<Eigen::Matrix3d> common_motion(V), expected(V + noise);
+  if (common_motion.info() != Eigen::Success || expected.info() != Eigen::Success)
+    return conditioned;
+  // f V for V: P <- P + (f - 1) P A^T V^-1 A P, which leaves what is not common as it is.
+  const double f = std::max(1.0, common.dot(expected.solve(common)) / 3.0);
+  const Eigen::Matrix3Xd widened =
+      std::sqrt(f - 1.0) * common_motion.matrixL().solve(PA.transpose());
+  conditioned.S += widened.transpose() * widened;
+
+  const Eigen::LLT<Eigen::Matrix3d> measured(f * V + noise);
+  conditioned.z += f * PA * measured.solve(common);
+  const Eigen::Matrix3Xd root = f * measured.matrixL().solve(PA.transpose());
   conditioned.S -= root.transpose() * root;
   return conditioned;
 }

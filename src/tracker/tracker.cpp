@@ -35,7 +35,7 @@ void Tracker::Implementation::reset(const std::string& reason) {
   start_adjustment_.end();
   structure_.clear();
   structure_snapshot_ = {};
-  filter_.reset(CameraState(), Eigen::Matrix<double, 12, 12>::Zero());
+  filter_.reset(CameraState(), MotionCovariance::Zero());
   scale_source_ = ScaleSource::kFree;
   previous_image_.release();
   poor_frames_ = 0;
@@ -62,6 +62,7 @@ void Tracker::Implementation::setScale(double factor) {
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   filter_.rescale(factor);
   map_.rescale(factor);
+  T_world_camera_before_.translation() *= factor;
   scale_source_ = ScaleSource::kService;
 }
 
@@ -139,11 +140,14 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     state_stamp_s_ = stamp_s;
     predict(interval_s_);
     frame->timings_ms.predict = stage.lap();
-    // Over a long gap the prediction says next to nothing: the whole image is asked first.
+    // Over a long gap, or when nothing has been where it should be for a while, the prediction says
+    // next to nothing: the whole image is asked first.
     const bool is_gap = interval_s_ > options_.max_frame_interval_s;
-    if (!is_gap || !findInMap(image, frame.get())) follow(image, frame.get());
+    const bool is_astray = poor_frames_ > 0 && poor_frames_ % kFramesBetweenLooks == 0;
+    if (!(is_gap || is_astray) || !findInMap(image, frame.get())) follow(image, frame.get());
   }
   image.copyTo(previous_image_);  // the caller may use its memory again
+  if (poor_frames_ == 0) image.copyTo(image_before_);
   frame->state = state_;
   if (!reason_.empty()) frame->reason = reason_;
   describe(frame.get());

@@ -18,6 +18,9 @@ namespace active_matching_slam {
 /// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
 /// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_lost.cpp and
 /// tracked_frame.cpp.
+/// A look through the whole map takes long.
+constexpr int kFramesBetweenLooks = 4;
+
 class Tracker::Implementation {
  public:
   Implementation(const CameraModel& camera, const TrackerOptions& options)
@@ -91,7 +94,9 @@ class Tracker::Implementation {
   std::string reason_;
   ScaleSource scale_source_ = ScaleSource::kFree;
   cv::Mat previous_image_;
-  Eigen::Isometry3d T_world_camera_before_ = Eigen::Isometry3d::Identity();  ///< of that image
+  /// The last image in which enough was matched, and its camera.
+  cv::Mat image_before_;
+  Eigen::Isometry3d T_world_camera_before_ = Eigen::Isometry3d::Identity();
   double last_stamp_s_ = 0.0;   ///< of the last image accepted
   double state_stamp_s_ = 0.0;  ///< of the filter's state
   double interval_s_ = 0.0;     ///< from the state before to this

@@ -9,7 +9,6 @@ namespace {
 
 constexpr double kFoundSigmaPosition = 0.2;  ///< of a place found again, in scene depths
 constexpr double kFoundSigmaRotation = 0.1;  ///< [rad]
-constexpr int kFramesBetweenLooks = 4;       ///< a look through the whole map takes long
 
 }  // namespace
 

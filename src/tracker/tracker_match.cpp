@@ -26,6 +26,9 @@ constexpr double kFirstShare = 0.6;        ///< of the budget, for the first att
 constexpr double kShareOfRest = 0.5;       ///< for each opinion but the last, which has it all
 constexpr double kAgreementChi2 = 13.8;    ///< 99.9 % of 2 degrees of freedom
 constexpr double kMostLogFalseAlarms = -1.0;
+/// Share of its velocity that a camera keeps from one frame without matches to the next: a hand
+/// that jerks does not go on for long.
+constexpr double kSlowingUnseen = 0.7;
 /// Pixels in all ellipses together beyond which the image's motion guides the first attempt.
 constexpr double kWideGatesPx = 2e5;
 
@@ -40,7 +43,8 @@ double gatesPixels(const MeasurementPrior& prior) {
 }  // namespace
 
 void Tracker::Implementation::predict(double interval_s) {
-  T_world_camera_before_ = filter_.camera().poseWorldCamera();
+  if (poor_frames_ == 0) T_world_camera_before_ = filter_.camera().poseWorldCamera();
+  if (poor_frames_ > 0) filter_.doubtVelocity(kSlowingUnseen);
   filter_.predict(std::min(interval_s, options_.max_frame_interval_s));
 }
 
@@ -108,9 +112,10 @@ bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& p
   return is_better;
 }
 
-/// The prior once it is known how the image as a whole moved. Empty when that can't be told.
+/// The prior once it is known how the image as a whole moved since the last whose camera is known.
+/// Empty when that can't be told.
 std::optional<MeasurementPrior> Tracker::Implementation::guidedPrior(const cv::Mat& image) const {
-  if (previous_image_.size() != image.size()) return std::nullopt;
+  if (image_before_.size() != image.size()) return std::nullopt;
   const Eigen::Isometry3d T_camera_world = T_world_camera_before_.inverse();
   const int n = prior_.size();
   std::vector<std::optional<Eigen::Vector2d>> before_px(n);
@@ -120,7 +125,7 @@ std::optional<MeasurementPrior> Tracker::Implementation::guidedPrior(const cv::M
                                    point.w() * T_camera_world.translation());
   }
   const auto motion =
-      estimateImageMotion(previous_image_, image, predictedImageMotion(prior_, before_px));
+      estimateImageMotion(image_before_, image, predictedImageMotion(prior_, before_px));
   if (!motion) return std::nullopt;
   return conditionOnImageMotion(prior_, before_px, *motion);
 }

@@ -29,7 +29,7 @@ std::vector<Eigen::Vector3d> pointsInView(const CameraModel& camera, int count) 
 constexpr int kLenses = 7;
 
 /// More than any calibration should get wrong.
-LensCorrection largeCorrection() { return {0.06, -0.04, {5.0, -7.0}}; }
+LensCorrection largeCorrection() { return {0.06, -0.04, {0.012, -0.017}}; }
 
 /// As calibrated, the second time through corrected with a large correction.
 class EveryLens : public testing::TestWithParam<int> {
@@ -106,7 +106,7 @@ TEST_P(EveryLens, PixelByCorrectionEqualsNumericalDerivative) {
   for (const Eigen::Vector3d& point : pointsInView(camera_, 50)) {
     const auto pixelWith = [&](const Eigen::Vector4d& d) {
       const LensCorrection moved{correction.focal + d[0], correction.radial + d[1],
-                                 correction.centre_px + d.tail<2>()};
+                                 correction.centre + d.tail<2>()};
       return *camera_.corrected(moved).project(point);
     };
     const Eigen::Matrix<double, 2, 4> analytic = camera_.pixelByCorrection(*camera_.project(point));
@@ -124,10 +124,10 @@ TEST_P(EveryCalibratedLens, ACorrectionMovesPixelsAsItsDefinitionSays) {
   const Eigen::Vector2d centre(c.cx, c.cy);
   const LensCorrection l = largeCorrection();
   for (const Eigen::Vector3d& point : pointsInView(camera_, 50)) {
-    const Eigen::Vector2d offset = *camera_.project(point) - centre;
-    const double n2 = std::pow(offset.x() / c.fx, 2) + std::pow(offset.y() / c.fy, 2);
-    const Eigen::Vector2d expected =
-        centre + l.centre_px + (1.0 + l.focal + l.radial * n2) * offset;
+    const Eigen::Vector2d focal_px(c.fx, c.fy);
+    const Eigen::Vector2d n = (*camera_.project(point) - centre).cwiseQuotient(focal_px);
+    const Eigen::Vector2d moved = l.centre + (1.0 + l.focal + l.radial * n.squaredNorm()) * n;
+    const Eigen::Vector2d expected = centre + moved.cwiseProduct(focal_px);
     EXPECT_LT((*camera_.corrected(l).project(point) - expected).norm(), 1e-9);
   }
 }

@@ -25,7 +25,7 @@ SimulationOptions baseOptions() {
   options.seconds = secondsOfARun();
   // The simulated camera is exactly as calibrated: doubt of that would be no match of its errors.
   options.filter.initial_sigma_readout_s = options.filter.initial_sigma_focal = 0.0;
-  options.filter.initial_sigma_radial = options.filter.initial_sigma_centre_px = 0.0;
+  options.filter.initial_sigma_radial = options.filter.initial_sigma_centre = 0.0;
   return options;
 }
 

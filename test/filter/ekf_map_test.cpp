@@ -111,7 +111,7 @@ TEST_F(EkfMap, ANewFeatureIsFullyCorrelatedWithTheCamera) {
     };
     Eigen::MatrixXd J(6, kCamera + 3);
     for (int i = 0; i < J.cols(); ++i) {
-      const double step = i >= CameraError::kCentre && i < kCamera + 2 ? 1e-2 : 1e-5;
+      const double step = i >= kCamera && i < kCamera + 2 ? 1e-2 : 1e-5;
       const Eigen::VectorXd d = step * Eigen::VectorXd::Unit(J.cols(), i);
       J.col(i) = (created(d) - created(-d)) / (2.0 * step);
     }
@@ -138,17 +138,17 @@ TEST_F(EkfMap, AFreshCalibrationIsAsUncertainAsTheOptionsSay) {
   options.initial_sigma_readout_s = 0.02;
   options.initial_sigma_focal = 0.03;
   options.initial_sigma_radial = 0.04;
-  options.initial_sigma_centre_px = 5.0;
+  options.initial_sigma_centre = 0.05;
   Ekf filter = exampleFilter(model_, 11, 6, CameraState(), options);
   Random random(11);
   const Eigen::Matrix<double, 12, 12> motion = exampleCameraCovariance(random);
   filter.reset(poorlyCalibratedCamera(), motion);
   Eigen::MatrixXd P = Eigen::MatrixXd::Zero(CameraError::kSize, CameraError::kSize);
   P.topLeftCorner<12, 12>() = motion;
-  P.diagonal().tail<5>() << 4e-4, 9e-4, 16e-4, 25.0, 25.0;
+  P.diagonal().tail<5>() << 4e-4, 9e-4, 16e-4, 25e-4, 25e-4;
   EXPECT_LT((filter.covariance() - P).norm(), 1e-15);
   EXPECT_EQ(filter.camera().readout_s, poorlyCalibratedCamera().readout_s);
-  EXPECT_EQ(filter.camera().lens.centre_px, poorlyCalibratedCamera().lens.centre_px);
+  EXPECT_EQ(filter.camera().lens.centre, poorlyCalibratedCamera().lens.centre);
 }
 
 TEST_F(EkfMap, FeaturesThatCanNotBeUnprojectedAreRefused) {

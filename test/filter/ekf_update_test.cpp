@@ -290,7 +290,7 @@ TEST_F(EkfUpdate, StaysSymmetricAndPositiveOverALongRun) {
 TEST_F(EkfUpdate, ACalibrationBeyondDoubtStaysAsItIs) {
   FilterOptions certain = exampleOptions();
   certain.initial_sigma_readout_s = certain.initial_sigma_focal = 0.0;
-  certain.initial_sigma_radial = certain.initial_sigma_centre_px = 0.0;
+  certain.initial_sigma_radial = certain.initial_sigma_centre = 0.0;
   const CameraState given = poorlyCalibratedCamera();
   const Ekf filter = exampleFilter(model_, 10, 6, given, certain);
   EXPECT_TRUE(filter.covariance().middleRows<5>(CameraError::kReadout).isZero(0.0));
@@ -298,7 +298,26 @@ TEST_F(EkfUpdate, ACalibrationBeyondDoubtStaysAsItIs) {
   EXPECT_EQ(filter.camera().readout_s, given.readout_s);
   EXPECT_EQ(filter.camera().lens.focal, given.lens.focal);
   EXPECT_EQ(filter.camera().lens.radial, given.lens.radial);
-  EXPECT_EQ(filter.camera().lens.centre_px, given.lens.centre_px);
+  EXPECT_EQ(filter.camera().lens.centre, given.lens.centre);
+}
+
+TEST_F(EkfUpdate, ACameraThatMayHaveSlowedDownIsNotSureOfIt) {
+  Ekf filter = exampleFilter(model_, 12);
+  const CameraState before = filter.camera();
+  const Eigen::MatrixXd P = filter.covariance();
+  filter.doubtVelocity(0.25);
+  const CameraState after = filter.camera();
+  EXPECT_EQ(after.velocity_world, 0.25 * before.velocity_world);
+  EXPECT_EQ(after.angular_velocity_camera, 0.25 * before.angular_velocity_camera);
+  EXPECT_EQ(after.position_world, before.position_world);
+  const Eigen::MatrixXd added = Eigen::MatrixXd(filter.covariance()) - P;
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(P.rows(), P.cols());
+  const Eigen::Vector3d v = 0.75 * before.velocity_world, w = 0.75 * before.angular_velocity_camera;
+  expected.block<3, 3>(CameraError::kVelocity, CameraError::kVelocity) = v * v.transpose();
+  expected.block<3, 3>(CameraError::kAngularVelocity, CameraError::kAngularVelocity) =
+      w * w.transpose();
+  EXPECT_GT(expected.norm(), 1e-3);
+  EXPECT_LT((added - expected).norm(), 1e-12);
 }
 
 TEST_F(EkfUpdate, IsTheSameBitForBitWhenRepeated) {

@@ -29,7 +29,7 @@ inline CameraCalibration exampleCalibration() {
 inline FilterOptions exampleOptions() {
   FilterOptions options;
   options.initial_sigma_focal = options.initial_sigma_radial = 0.01;
-  options.initial_sigma_centre_px = 3.0;
+  options.initial_sigma_centre = 0.007;
   options.sigma_acceleration_mps2 = 1.0;
   options.sigma_angular_acceleration_rps2 = 1.0;
   options.sigma_px = 1.0;
@@ -75,7 +75,7 @@ inline CameraState exampleCamera(Random& random) {
 inline CameraState poorlyCalibratedCamera() {
   CameraState camera;
   camera.readout_s = 0.03;
-  camera.lens = {0.01, -0.02, Eigen::Vector2d(2.0, -3.0)};
+  camera.lens = {0.01, -0.02, Eigen::Vector2d(0.005, -0.007)};
   return camera;
 }
 
@@ -148,7 +148,7 @@ inline Eigen::VectorXd errorBetween(const CameraState& camera,
   delta[CameraError::kReadout] = other.readout_s - camera.readout_s;
   delta[CameraError::kFocal] = other.lens.focal - camera.lens.focal;
   delta[CameraError::kRadial] = other.lens.radial - camera.lens.radial;
-  delta.segment<2>(CameraError::kCentre) = other.lens.centre_px - camera.lens.centre_px;
+  delta.segment<2>(CameraError::kCentre) = other.lens.centre - camera.lens.centre;
   for (std::size_t i = 0; i < features.size(); ++i) {
     const FeatureState &a = features[i], &b = others[i];
     if (a.kind == FeatureKind::kPoint) {

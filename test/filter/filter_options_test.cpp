@@ -37,7 +37,7 @@ const DoubleOption kOptions[] = {
     {"initial_sigma_readout_s", &FilterOptions::initial_sigma_readout_s, true},
     {"initial_sigma_focal", &FilterOptions::initial_sigma_focal, true},
     {"initial_sigma_radial", &FilterOptions::initial_sigma_radial, true},
-    {"initial_sigma_centre_px", &FilterOptions::initial_sigma_centre_px, true},
+    {"initial_sigma_centre", &FilterOptions::initial_sigma_centre, true},
     {"initial_inverse_depth", &FilterOptions::initial_inverse_depth, false},
     {"initial_sigma_inverse_depth", &FilterOptions::initial_sigma_inverse_depth, false},
     {"linearity_threshold", &FilterOptions::linearity_threshold, true},

@@ -12,7 +12,7 @@ using Calibration = Eigen::Matrix<double, 5, 1>;  ///< in the order of CameraErr
 
 Calibration calibrationOf(const CameraState& camera) {
   Calibration numbers;
-  numbers << camera.readout_s, camera.lens.focal, camera.lens.radial, camera.lens.centre_px;
+  numbers << camera.readout_s, camera.lens.focal, camera.lens.radial, camera.lens.centre;
   return numbers;
 }
 
@@ -83,7 +83,7 @@ Ekf learn(const CameraState& truth, unsigned seed) {
   FilterOptions options;
   options.sigma_px = sigma_px;
   options.initial_sigma_focal = options.initial_sigma_radial = 0.01;
-  options.initial_sigma_centre_px = 3.0;
+  options.initial_sigma_centre = 0.007;
   options.sigma_acceleration_mps2 = 6.0;
   options.sigma_angular_acceleration_rps2 = 10.0;
   Ekf filter(options);
@@ -114,7 +114,7 @@ TEST(SelfCalibration, FindsReadoutAndLens) {
   for (int seed = 0; seed < 6; ++seed) {
     CameraState truth;
     truth.readout_s = seed % 2 == 0 ? 0.025 : -0.025;  // from above and from below
-    truth.lens = {0.005, 0.0, {1.5, -1.5}};
+    truth.lens = {0.005, 0.0, {0.0035, -0.0035}};
     const Ekf filter = learn(truth, 100 + seed);
     const Calibration error = calibrationOf(filter.camera()) - calibrationOf(truth);
     // The filter's velocity is that of the last interval, half of it late: of a shaking camera the
@@ -123,7 +123,7 @@ TEST(SelfCalibration, FindsReadoutAndLens) {
     EXPECT_LT(std::abs(error[0]), 2e-3) << seed;
     EXPECT_LT(std::abs(error[1]), 2e-3) << seed;
     EXPECT_LT(std::abs(error[2]), 1e-3) << seed;
-    EXPECT_LT(error.tail<2>().norm(), 3.0) << seed;
+    EXPECT_LT(error.tail<2>().norm(), 0.007) << seed;
   }
 }
 

@@ -34,11 +34,11 @@ MapFileContent smallMap() {
   content.scale_source = 2;
   FilterOptions options;
   options.initial_sigma_focal = options.initial_sigma_radial = 0.01;
-  options.initial_sigma_centre_px = 3.0;
+  options.initial_sigma_centre = 0.007;
   Ekf filter(options);
   CameraState start;
   start.readout_s = 0.02;
-  start.lens = {0.005, -0.01, {1.5, -2.5}};
+  start.lens = {0.005, -0.01, {0.004, -0.006}};
   filter.reset(start, 0.01 * Eigen::Matrix<double, 12, 12>::Identity());
   const CameraModel camera(content.camera);
   filter.addInverseDepthFeature(camera, {100.25, 80.5}, 0.5, 0.1);
@@ -114,7 +114,7 @@ TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
   EXPECT_EQ(read.camera_state.readout_s, 0.02);
   EXPECT_EQ(read.camera_state.lens.focal, 0.005);
   EXPECT_EQ(read.camera_state.lens.radial, -0.01);
-  EXPECT_EQ(read.camera_state.lens.centre_px, Eigen::Vector2d(1.5, -2.5));
+  EXPECT_EQ(read.camera_state.lens.centre, Eigen::Vector2d(0.004, -0.006));
   EXPECT_EQ(read.covariance, written.covariance);
   EXPECT_EQ(read.next_id, 4);
   EXPECT_EQ(read.scale_source, 2);
@@ -333,7 +333,7 @@ TEST(EkfRestore, RefusesWhatDoesNotFitTogetherAndChangesNothing) {
   bad.camera_state.lens.radial = nan;
   expectThrow(bad);
   bad = good;
-  bad.camera_state.lens.centre_px.y() = nan;
+  bad.camera_state.lens.centre.y() = nan;
   expectThrow(bad);
   bad = good;
   bad.features[1].inverse_depth = 0.0;
@@ -355,7 +355,7 @@ TEST(EkfRestore, ARelocatedCameraHasNothingButItsCalibrationInCommonWithTheMap) 
   EXPECT_EQ(filter.camera().readout_s, content.camera_state.readout_s);
   EXPECT_EQ(filter.camera().lens.focal, content.camera_state.lens.focal);
   EXPECT_EQ(filter.camera().lens.radial, content.camera_state.lens.radial);
-  EXPECT_EQ(filter.camera().lens.centre_px, content.camera_state.lens.centre_px);
+  EXPECT_EQ(filter.camera().lens.centre, content.camera_state.lens.centre);
   EXPECT_EQ(P.topLeftCorner(12, 12), 0.04 * Eigen::MatrixXd::Identity(12, 12));
   EXPECT_TRUE(P.topRightCorner(12, rest).isZero(0.0));
   EXPECT_TRUE(P.bottomLeftCorner(rest, 12).isZero(0.0));

@@ -95,6 +95,18 @@ TEST(FeatureMessage, NothingThatIsNotFiniteIsPublished) {
   EXPECT_EQ(0.0, toStatisticsMsg(frame, 0, worldHeader()).nis);
 }
 
+TEST(StatisticsMessage, TellsTheCalibrationAsLearnt) {
+  TrackedFrame frame;
+  frame.camera.readout_s = 0.024;
+  frame.camera.lens = {0.01, -0.02, {0.003, -0.004}};
+  const auto message = toStatisticsMsg(frame, 0, worldHeader());
+  EXPECT_EQ(0.024, message.readout_s);
+  EXPECT_EQ(0.01, message.lens_focal);
+  EXPECT_EQ(-0.02, message.lens_radial);
+  EXPECT_EQ(0.003, message.lens_centre_x);
+  EXPECT_EQ(-0.004, message.lens_centre_y);
+}
+
 TEST(PointCloud, OfAnEmptyMapHasItsFieldsAndNoPoints) {
   const auto cloud = toPointCloudMsg(TrackedFrame(), 0, worldHeader());
   EXPECT_EQ(0u, cloud.width);

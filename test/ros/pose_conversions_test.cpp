@@ -30,8 +30,8 @@ CameraState movingCamera() {
 }
 
 /// A covariance without symmetries that could hide a wrong order or a missing rotation.
-Matrix12d lopsidedCovariance() {
-  Matrix12d L = Matrix12d::Zero();
+MotionCovariance lopsidedCovariance() {
+  MotionCovariance L = MotionCovariance::Zero();
   for (int row = 0; row < 12; ++row)
     for (int col = 0; col <= row; ++col)
       L(row, col) = 0.004 * (1.0 + 0.3 * ((row * 5 + col * 3) % 7)) * (row == col ? 1.5 : 0.4);
@@ -51,11 +51,11 @@ struct SampledCovariance {
 
 /// Draws true cameras around the mean, moves each to the body by the definitions of pose and twist
 /// alone, and looks at how the results scatter.
-SampledCovariance sampleCovariance(const CameraState& mean, const Matrix12d& covariance,
+SampledCovariance sampleCovariance(const CameraState& mean, const MotionCovariance& covariance,
                                    const Eigen::Isometry3d& T_camera_body, int count) {
   std::mt19937 generator(5);
   std::normal_distribution<double> normal;
-  const Matrix12d L = covariance.llt().matrixL();
+  const MotionCovariance L = covariance.llt().matrixL();
   const RigidBodyState body = rigidBodyState(mean, covariance, T_camera_body);
   SampledCovariance sampled;
   for (int i = 0; i < count; ++i) {
@@ -111,7 +111,7 @@ TEST(PoseConversions, CovarianceOfABodyOnALeverIsThatOfSampledPosesAndTwists) {
 
 TEST(PoseConversions, TwistIsTheMotionOfTheBodySeenFromTheBody) {
   const CameraState now = movingCamera();
-  const RigidBodyState body = rigidBodyState(now, Matrix12d::Identity(), leverArm());
+  const RigidBodyState body = rigidBodyState(now, MotionCovariance::Identity(), leverArm());
   const double dt = 1e-6;
   CameraState later = now;
   later.position_world += dt * now.velocity_world;

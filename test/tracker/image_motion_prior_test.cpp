@@ -109,6 +109,41 @@ TEST(ImageMotionPrior, IsBayesRule) {
   EXPECT_LT((after.z - z).norm(), 1e-6 * z.norm());
 }
 
+TEST(ImageMotionPrior, FollowsAJerkThatThePriorDidNotAllowFor) {
+  const int n = 30;
+  Case c = makeCase(n, 3);
+  const Eigen::MatrixXd M = meanShift(n), shift = n * M.transpose();
+  // A turn of the camera, 4 px, and half a pixel of each feature's own.
+  c.prior.S = 16.0 * shift * shift.transpose();
+  c.prior.S.diagonal().array() += 0.25 + kNoisePx2;
+  Eigen::VectorXd turn(2 * n);
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector2d arm = c.prior.mean(i) - M * c.prior.z;
+    turn.segment<2>(2 * i) << -arm.y(), arm.x();
+  }
+  const auto wantedOf = [&](const ImageMotion& motion) {
+    Eigen::Vector2d wanted = Eigen::Vector2d::Zero();
+    for (const auto& before : c.before_px) wanted += motion(*before) / n;
+    return wanted;
+  };
+  for (const double jerk_px : {20.0, 40.0, 80.0}) {
+    const ImageMotion motion = shiftedBy(12.0 + jerk_px, -5.0, 3.0);
+    const MeasurementPrior after = conditionOnImageMotion(c.prior, c.before_px, motion);
+    const Eigen::Vector2d off = M * after.z - wantedOf(motion);
+    const Eigen::Matrix2d S = M * after.S * M.transpose();
+    EXPECT_LT(off.norm(), 0.25 * jerk_px) << jerk_px;
+    EXPECT_LT(off.dot(S.inverse() * off), 9.0) << jerk_px;  // where the gates reach
+    EXPECT_LT(std::sqrt(S.trace() / 2.0), 4.0) << jerk_px;  // and no wider than needed
+    EXPECT_EQ(after.S, after.S.transpose());
+    // What the features do on their own is as open as it was.
+    Eigen::VectorXd own = Eigen::VectorXd::Zero(2 * n);
+    own[0] = own[2] = 1.0;
+    own[4] = own[6] = -1.0;
+    own -= turn * (turn.dot(own) / turn.squaredNorm());
+    EXPECT_NEAR(own.dot(after.S * own) / own.dot(c.prior.S * own), 1.0, 1e-9) << jerk_px;
+  }
+}
+
 TEST(ImageMotionPrior, NeverKnowsAMatchBetterThanItsNoise) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Case c = makeCase(3 + static_cast<int>(seed), seed);

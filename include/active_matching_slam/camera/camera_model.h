@@ -8,13 +8,12 @@
 
 namespace active_matching_slam {
 
-/// What a calibration got wrong, as far as images tell: with n the offset of a pixel from the image
-/// centre over the focal length, the pixel moves to
-/// centre + centre_px + (1 + focal + radial |n|^2) (pixel - centre).
+/// What a calibration got wrong, as far as images tell: a pixel at n from the image centre, over
+/// the focal length, moves to centre + (1 + focal + radial |n|^2) n.
 struct LensCorrection {
   double focal = 0.0;   ///< relative growth of the focal length
   double radial = 0.0;  ///< relative growth at |n| = 1, beyond that of the focal length
-  Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< shift of the image centre
 };
 
 /// Projection between points in the camera's optical frame (x right, y down, z forward; REP 103)
@@ -55,10 +54,12 @@ class CameraModel {
   }
 
  private:
-  /// Pixel of the calibration alone to the corrected one, with the 2 x 2 Jacobian when asked for.
-  Eigen::Vector2d correct(const Eigen::Vector2d& pixel, Eigen::Matrix2d* jacobian) const;
+  /// Distorted coordinates by the calibration alone to corrected ones, with the 2 x 2 Jacobian.
+  Eigen::Vector2d correct(const Eigen::Vector2d& distorted, Eigen::Matrix2d* jacobian) const;
   /// Inverse of correct(); empty where there is none.
-  std::optional<Eigen::Vector2d> uncorrect(const Eigen::Vector2d& pixel) const;
+  std::optional<Eigen::Vector2d> uncorrect(const Eigen::Vector2d& corrected) const;
+  /// Offset of a pixel from the image centre over the focal length.
+  Eigen::Vector2d normalised(const Eigen::Vector2d& pixel) const;
   /// Factor s(r^2) between ideal and radially distorted image coordinates, and its derivative.
   double radialScale(double r2, double* d_scale_d_r2) const;
   /// Ideal to distorted normalised coordinates, with the 2 x 2 Jacobian when asked for.

@@ -19,6 +19,8 @@ struct FrameRecord {
   StampedPose pose;    ///< a claim only when the state is kTracking
   double speed = 0.0;  ///< [m/s]
   Eigen::Matrix<double, 6, 6> pose_covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  double readout_s = 0.0;  ///< as learnt so far; so is the lens
+  LensCorrection lens;
   double nis = 0.0;
   int nis_degrees = 0;
   int map_features = 0, map_points = 0;  ///< all, and those converted from inverse depth

@@ -37,6 +37,9 @@ struct CameraError {
                        kSize = 17, kCalibrationSize = kSize - kMotionSize;
 };
 
+/// Covariance of the motion alone, in the order of CameraError.
+using MotionCovariance = Eigen::Matrix<double, CameraError::kMotionSize, CameraError::kMotionSize>;
+
 /// Readout and lens in the order of CameraError.
 using CalibrationVector = Eigen::Matrix<double, CameraError::kCalibrationSize, 1>;
 

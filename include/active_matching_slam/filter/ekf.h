@@ -46,7 +46,7 @@ class Ekf {
 
   /// Empties the map and puts the camera at `camera` with `covariance` of its motion (12 x 12,
   /// CameraError order); its calibration is as uncertain as the options say.
-  void reset(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& covariance);
+  void reset(const CameraState& camera, const MotionCovariance& covariance);
 
   /// Takes over a saved state: camera, features by ascending id (their offsets are computed anew)
   /// and the whole covariance in that order; new features will be numbered from `next_id`. Throws
@@ -57,10 +57,14 @@ class Ekf {
   /// The camera is somewhere else, known by other means: its old motion and all that it had in
   /// common with the map are forgotten; the map and what is known of the calibration stay.
   /// `covariance` as for reset().
-  void relocateCamera(const CameraState& camera, const Eigen::Matrix<double, 12, 12>& covariance);
+  void relocateCamera(const CameraState& camera, const MotionCovariance& covariance);
 
   /// Moves on by `interval_s` >= 0 with constant velocity (eq. 3.6-3.8).
   void predict(double interval_s);
+
+  /// The camera may have slowed down: it keeps a share of its velocities, 0 to 1; what they lose is
+  /// one standard deviation more of them.
+  void doubtVelocity(double share);
 
   /// New feature seen at `pixel` in the present camera; returns its id, or -1 when the pixel can't
   /// be unprojected. Zero `inverse_depth` takes the options' prior.
@@ -94,8 +98,8 @@ class Ekf {
   /// Symmetric, camera first, then every feature at its offset. A view: copy it to keep it.
   CovarianceMatrix::ConstView covariance() const { return covariance_.view(); }
   int stateSize() const { return covariance_.size(); }
-  Eigen::Matrix<double, 12, 12> cameraCovariance() const {
-    return covariance_.view().topLeftCorner<12, 12>();
+  MotionCovariance cameraCovariance() const {
+    return covariance_.view().topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>();
   }
   /// 3 x 3 covariance of a feature's position in the world (first order for inverse depth).
   Eigen::Matrix3d positionCovariance(const FeatureState& feature) const;

@@ -13,9 +13,9 @@ struct FilterOptions {
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
   double initial_sigma_readout_s = 0.01;
-  double initial_sigma_focal = 0.0;   ///< relative
-  double initial_sigma_radial = 0.0;  ///< see LensCorrection
-  double initial_sigma_centre_px = 0.0;
+  double initial_sigma_focal = 0.01;  ///< these: see LensCorrection
+  double initial_sigma_radial = 0.02;
+  double initial_sigma_centre = 0.006;
   double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
   double initial_sigma_inverse_depth = 0.5;  ///< infinity within 2 sigma (Civera 2008)
   double linearity_threshold = 0.02;         ///< inverse depth -> point below (Civera 2008)

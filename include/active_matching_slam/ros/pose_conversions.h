@@ -14,7 +14,6 @@
 namespace active_matching_slam {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Matrix12d = Eigen::Matrix<double, 12, 12>;
 
 geometry_msgs::Point toPointMsg(const Eigen::Vector3d& point);
 geometry_msgs::Vector3 toVectorMsg(const Eigen::Vector3d& vector);
@@ -39,7 +38,7 @@ struct RigidBodyState {
 
 /// `T_camera_body` (body points into the camera frame) is taken as exactly known; identity
 /// describes the camera itself. `covariance` is in CameraError order. First order.
-RigidBodyState rigidBodyState(const CameraState& camera, const Matrix12d& covariance,
+RigidBodyState rigidBodyState(const CameraState& camera, const MotionCovariance& covariance,
                               const Eigen::Isometry3d& T_camera_body);
 
 geometry_msgs::PoseWithCovarianceStamped toPoseWithCovarianceMsg(const RigidBodyState& state,

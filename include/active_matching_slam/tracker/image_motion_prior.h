@@ -17,8 +17,10 @@ ImageMotion predictedImageMotion(const MeasurementPrior& prior,
 /// The prior given how the image as a whole moved: a measurement of three numbers, the mean shift
 /// (2) and the turn about their centre of all features together. What one feature moves differently
 /// from the rest, by its depth, stays open; and the more the features are expected to move
-/// differently, the less the measurement counts. The noise that is inside S stays what it is. Of
-/// fewer than three features the prior is returned as it is.
+/// differently, the less the measurement counts. A motion beyond what the prior allows for (a jerk)
+/// is taken for what it is: the prior of the common motion is as wide as to make it no surprise.
+/// The noise that is inside S stays what it is. Of fewer than three features the prior is returned
+/// as it is.
 MeasurementPrior conditionOnImageMotion(
     const MeasurementPrior& prior, const std::vector<std::optional<Eigen::Vector2d>>& before_px,
     const ImageMotion& motion);

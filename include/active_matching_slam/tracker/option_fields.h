@@ -67,9 +67,10 @@ void visitOptions(Options& o, Visitor&& visit) {
   visit(F{"filter/initial_sigma_radial",
           "trust in the calibration: of radial distortion at 45 degrees, relative", true},
         o.filter.initial_sigma_radial, 0.0, 0.2);
-  visit(F{"filter/initial_sigma_centre_px",
-          "trust in the calibration: of the image centre, per axis [px]", true},
-        o.filter.initial_sigma_centre_px, 0.0, 100.0);
+  visit(F{"filter/initial_sigma_centre",
+          "trust in the calibration: of the image centre, per axis, relative to the focal length",
+          true},
+        o.filter.initial_sigma_centre, 0.0, 0.2);
   visit(F{"filter/initial_inverse_depth",
           "prior of a new feature; fixes the map unit when scale is "
           "free [1/m]",

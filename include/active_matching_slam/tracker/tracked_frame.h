@@ -74,7 +74,7 @@ struct TrackedFrame {
 
   CameraState camera;
   /// 12 x 12, CameraError order (world-frame additive position, world-frame rotation vector, ...).
-  Eigen::Matrix<double, 12, 12> camera_covariance = Eigen::Matrix<double, 12, 12>::Zero();
+  MotionCovariance camera_covariance = MotionCovariance::Zero();
   double nis = 0.0;
   int nis_degrees = 0;
 
