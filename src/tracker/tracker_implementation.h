@@ -15,12 +15,12 @@
 
 namespace active_matching_slam {
 
-/// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
-/// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_lost.cpp and
-/// tracked_frame.cpp.
 /// A look through the whole map takes long.
 constexpr int kFramesBetweenLooks = 4;
 
+/// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
+/// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_lost.cpp and
+/// tracked_frame.cpp.
 class Tracker::Implementation {
  public:
   Implementation(const CameraModel& camera, const TrackerOptions& options)

@@ -43,8 +43,11 @@ double gatesPixels(const MeasurementPrior& prior) {
 }  // namespace
 
 void Tracker::Implementation::predict(double interval_s) {
-  if (poor_frames_ == 0) T_world_camera_before_ = filter_.camera().poseWorldCamera();
-  if (poor_frames_ > 0) filter_.doubtVelocity(kSlowingUnseen);
+  if (poor_frames_ == 0) {
+    T_world_camera_before_ = filter_.camera().poseWorldCamera();
+  } else {
+    filter_.doubtVelocity(kSlowingUnseen);
+  }
   filter_.predict(std::min(interval_s, options_.max_frame_interval_s));
 }
 
