@@ -102,6 +102,36 @@ TEST(Relocaliser, FindsTheCameraAlongTheMotionAndNeverAWrongPlace) {
   }
 }
 
+TEST(Relocaliser, SeesThroughTheLensAsItIsKnownByNow) {
+  Simulator simulator(sequence("room"));
+  CameraCalibration faulty = simulator.camera().calibration();
+  faulty.fx *= 1.05;
+  faulty.fy *= 1.05;
+  LensCorrection fault;
+  fault.focal = 1.0 / 1.05 - 1.0;
+  const auto relocaliserFor = [](const CameraModel& camera) {
+    return Relocaliser(camera, RelocaliserOptions(), MapOptions(), ImageOptions());
+  };
+  const Relocaliser right = relocaliserFor(simulator.camera());
+  Relocaliser learning = relocaliserFor(CameraModel(faulty));
+  KnownMap known;
+  addFeatures(simulator, *simulator.next(), &known);
+  const cv::Mat image = simulator.next()->image;
+  const auto expected = right.find(image, known.filter, known.map);
+  ASSERT_TRUE(expected);
+  const auto by_fault = learning.find(image, known.filter, known.map);
+  learning.setCamera(CameraModel(faulty).corrected(fault));
+  const auto learnt = learning.find(image, known.filter, known.map);
+  ASSERT_TRUE(learnt);
+  const auto distance = [&expected](const Relocalisation& place) {
+    return (place.T_world_camera.translation() - expected->T_world_camera.translation()).norm();
+  };
+  EXPECT_LT(distance(*learnt), 1e-6);
+  if (by_fault) {
+    EXPECT_GT(distance(*by_fault), 1e-3);
+  }
+}
+
 TEST(Relocaliser, SaysNothingOfAnEmptyMapOrABlankOrForeignImage) {
   const CameraModel camera(makeSimulatedCalibration(320, 240, "none"));
   const Relocaliser relocaliser(camera, RelocaliserOptions(), MapOptions(), ImageOptions());

@@ -42,6 +42,9 @@ class Relocaliser {
   Relocaliser(const CameraModel& camera, const RelocaliserOptions& options, const MapOptions& map,
               const ImageOptions& image);
 
+  /// The same camera, its lens as known by now.
+  void setCamera(const CameraModel& camera) { camera_ = camera; }
+
   /// `image`: 8-bit grey of the camera's size. Empty when the place can't be told with certainty.
   /// The camera of `filter` plays no part.
   std::optional<Relocalisation> find(const cv::Mat& image, const Ekf& filter,
