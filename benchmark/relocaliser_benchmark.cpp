@@ -51,10 +51,10 @@ void look(benchmark::State& state, const std::string& scene) {
   filter.restore(content.camera_state, content.features, content.covariance, content.next_id);
   FeatureMap map;
   for (const MapFeature& feature : content.map) map.add(feature);
-  const Relocaliser relocaliser(room.camera(), {}, {}, {});
+  const Relocaliser relocaliser({}, {}, {});
   const cv::Mat image = scene == "room" ? room.next()->image : other.next()->image;
   bool found = false;
-  for (auto _ : state) found = relocaliser.find(image, filter, map).has_value();
+  for (auto _ : state) found = relocaliser.find(room.camera(), image, filter, map).has_value();
   state.counters["features"] = map.size();
   state.counters["found"] = found;
 }

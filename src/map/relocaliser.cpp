@@ -41,37 +41,37 @@ void checkRelocaliserOptions(const RelocaliserOptions& options) {
   checkRange("inlier_px", options.inlier_px, 0.5, 10.0);
 }
 
-Relocaliser::Relocaliser(const CameraModel& camera, const RelocaliserOptions& options,
-                         const MapOptions& map, const ImageOptions& image)
-    : camera_(camera), options_(options), map_options_(map), image_options_(image) {
+Relocaliser::Relocaliser(const RelocaliserOptions& options, const MapOptions& map,
+                         const ImageOptions& image)
+    : options_(options), map_options_(map), image_options_(image) {
   checkRelocaliserOptions(options);
   checkMapOptions(map);
   checkImageOptions(image);
 }
 
-std::optional<Relocalisation> Relocaliser::find(const cv::Mat& image, const Ekf& filter,
-                                                const FeatureMap& map) const {
-  if (image.type() != CV_8UC1 || image.cols != camera_.width() || image.rows != camera_.height())
+std::optional<Relocalisation> Relocaliser::find(const CameraModel& camera, const cv::Mat& image,
+                                                const Ekf& filter, const FeatureMap& map) const {
+  if (image.type() != CV_8UC1 || image.cols != camera.width() || image.rows != camera.height())
     return std::nullopt;
   const std::vector<Landmark> landmarks = usableLandmarks(filter, map);
   if (static_cast<int>(landmarks.size()) < options_.minimum_inliers) return std::nullopt;
-  auto T_world_camera = solvePose(matchDescriptors(image, landmarks));
+  auto T_world_camera = solvePose(camera, matchDescriptors(image, landmarks));
   if (!T_world_camera) return std::nullopt;
 
   std::vector<Sighting> found;
-  searchVisible(image, landmarks, *T_world_camera, options_.search_radius_px, &found);
+  searchVisible(camera, image, landmarks, *T_world_camera, options_.search_radius_px, &found);
   if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
-  *T_world_camera = refinePose(found, *T_world_camera);
+  *T_world_camera = refinePose(camera, found, *T_world_camera);
 
   // The proof, with templates as the refined pose expects them.
   Relocalisation result;
   result.searched =
-      searchVisible(image, landmarks, *T_world_camera, 2.0 * options_.inlier_px, &found);
+      searchVisible(camera, image, landmarks, *T_world_camera, 2.0 * options_.inlier_px, &found);
   if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
-  result.T_world_camera = refinePose(found, *T_world_camera);
+  result.T_world_camera = refinePose(camera, found, *T_world_camera);
   double sum = 0.0;
   for (const Sighting& sighting : found) {
-    const double distance = residual(sighting, result.T_world_camera);
+    const double distance = residual(camera, sighting, result.T_world_camera);
     if (!(distance <= options_.inlier_px)) continue;
     result.inliers.push_back({sighting.landmark->feature->id, sighting.pixel, 0.0});
     sum += distance * distance;
@@ -133,13 +133,13 @@ std::vector<Relocaliser::Sighting> Relocaliser::matchDescriptors(
 }
 
 std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
-    const std::vector<Sighting>& sightings) const {
+    const CameraModel& camera, const std::vector<Sighting>& sightings) const {
   // Ideal pixels: those of a lens without distortion and square pixels.
-  const double focal = 0.5 * (camera_.calibration().fx + camera_.calibration().fy);
+  const double focal = 0.5 * (camera.calibration().fx + camera.calibration().fy);
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> ideal;
   for (const Sighting& sighting : sightings) {
-    const auto ray = camera_.unproject(sighting.pixel);
+    const auto ray = camera.unproject(sighting.pixel);
     const Eigen::Vector3d position = sighting.landmark->state->position();
     if (!ray || !position.allFinite() || !(ray->head<2>().norm() < kLargestSlope * ray->z()))
       continue;
@@ -166,7 +166,8 @@ std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
   return T_camera_world.inverse();
 }
 
-int Relocaliser::searchVisible(const cv::Mat& image, const std::vector<Landmark>& landmarks,
+int Relocaliser::searchVisible(const CameraModel& camera, const cv::Mat& image,
+                               const std::vector<Landmark>& landmarks,
                                const Eigen::Isometry3d& T_world_camera, double radius_px,
                                std::vector<Sighting>* found) const {
   const double maximum_angle = map_options_.maximum_view_angle_deg * M_PI / 180.0;
@@ -174,10 +175,10 @@ int Relocaliser::searchVisible(const cv::Mat& image, const std::vector<Landmark>
   std::vector<Template> templates;
   std::vector<SearchEllipse> ellipses;
   for (const Landmark& landmark : landmarks) {
-    const auto view = predictPatchView(landmark.feature->patch, camera_, T_world_camera,
+    const auto view = predictPatchView(landmark.feature->patch, camera, T_world_camera,
                                        homogeneousPosition(*landmark.state));
     Template expected;
-    if (!view || !camera_.isInImage(view->pixel, image_options_.border_px) ||
+    if (!view || !camera.isInImage(view->pixel, image_options_.border_px) ||
         view->view_angle_rad > maximum_angle || view->scale < map_options_.minimum_scale ||
         view->scale > map_options_.maximum_scale ||
         !warpTemplate(landmark.feature->patch, *view, image_options_.template_size_px, &expected) ||
@@ -199,7 +200,8 @@ int Relocaliser::searchVisible(const cv::Mat& image, const std::vector<Landmark>
   return static_cast<int>(visible.size());
 }
 
-Eigen::Isometry3d Relocaliser::refinePose(const std::vector<Sighting>& sightings,
+Eigen::Isometry3d Relocaliser::refinePose(const CameraModel& camera,
+                                          const std::vector<Sighting>& sightings,
                                           Eigen::Isometry3d T_world_camera) const {
   constexpr int kIterations = 10;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
@@ -210,7 +212,7 @@ Eigen::Isometry3d Relocaliser::refinePose(const std::vector<Sighting>& sightings
       Eigen::Matrix<double, 2, 3> d_pixel_d_point;
       const Eigen::Vector3d point =
           R_camera_world * (sighting.landmark->state->position() - T_world_camera.translation());
-      const auto pixel = camera_.project(point, &d_pixel_d_point);
+      const auto pixel = camera.project(point, &d_pixel_d_point);
       if (!pixel) continue;
       // The pose gains (dt, dr) in the camera's frame: the point moves by -dt + [point]x dr.
       Eigen::Matrix<double, 3, 6> d_point;
@@ -230,12 +232,12 @@ Eigen::Isometry3d Relocaliser::refinePose(const std::vector<Sighting>& sightings
   return T_world_camera;
 }
 
-double Relocaliser::residual(const Sighting& sighting,
+double Relocaliser::residual(const CameraModel& camera, const Sighting& sighting,
                              const Eigen::Isometry3d& T_world_camera) const {
   const Eigen::Vector3d point =
       T_world_camera.linear().transpose() *
       (sighting.landmark->state->position() - T_world_camera.translation());
-  const auto pixel = camera_.project(point);
+  const auto pixel = camera.project(point);
   return pixel ? (*pixel - sighting.pixel).norm() : std::numeric_limits<double>::infinity();
 }
 

@@ -51,7 +51,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
         "while a map is kept");
   if (options.matcher != options_.matcher) matcher_ = createMatcher(options.matcher);
   filter_.setOptions(options.filter);
-  relocaliser_ = Relocaliser(camera_, {}, options.map, options.image);
+  relocaliser_ = Relocaliser({}, options.map, options.image);
   search_ = ImageFeatureSearch(options.image);
   second_search_ = ImageFeatureSearch(options.image);
   options_ = options;

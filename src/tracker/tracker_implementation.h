@@ -29,7 +29,7 @@ class Tracker::Implementation {
         filter_(options.filter),
         search_(options.image),
         second_search_(options.image),
-        relocaliser_(camera, {}, options.map, options.image),
+        relocaliser_({}, options.map, options.image),
         matcher_(createMatcher(options.matcher)),
         consensus_matcher_(createMatcher("one_point_ransac")),
         longest_matcher_(createMatcher("jcbb")) {

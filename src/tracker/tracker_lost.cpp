@@ -65,8 +65,7 @@ void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* fra
 /// Looks for the camera in the whole map by one whole image. False when it is not found; the state
 /// is then as before.
 bool Tracker::Implementation::findInMap(const cv::Mat& image, TrackedFrame* frame) {
-  relocaliser_.setCamera(camera_);
-  const auto found = relocaliser_.find(image, filter_, map_);
+  const auto found = relocaliser_.find(camera_, image, filter_, map_);
   if (!found) return false;
   CameraState camera;
   camera.position_world = found->T_world_camera.translation();

@@ -60,8 +60,7 @@ void addFeatures(const Simulator& simulator, const SimulatedFrame& frame, KnownM
 
 TEST(Relocaliser, FindsTheCameraAlongTheMotionAndNeverAWrongPlace) {
   Simulator simulator(sequence("room"));
-  const Relocaliser relocaliser(simulator.camera(), RelocaliserOptions(), MapOptions(),
-                                ImageOptions());
+  const Relocaliser relocaliser({}, {}, {});
   KnownMap known;
   int asked = 0, found = 0;
   double worst = 0.0;
@@ -72,7 +71,7 @@ TEST(Relocaliser, FindsTheCameraAlongTheMotionAndNeverAWrongPlace) {
     }
     if (frame->index < 4) continue;
     ++asked;
-    const auto place = relocaliser.find(frame->image, known.filter, known.map);
+    const auto place = relocaliser.find(simulator.camera(), frame->image, known.filter, known.map);
     if (!place) continue;
     ++found;
     const double error =
@@ -82,7 +81,8 @@ TEST(Relocaliser, FindsTheCameraAlongTheMotionAndNeverAWrongPlace) {
     EXPECT_GE(place->inliers.size(), 10u);
     EXPECT_LT(place->rms_px, 2.0);
     if (found == 1) {
-      const auto again = relocaliser.find(frame->image, known.filter, known.map);
+      const auto again =
+          relocaliser.find(simulator.camera(), frame->image, known.filter, known.map);
       ASSERT_TRUE(again);
       EXPECT_EQ(again->T_world_camera.matrix(), place->T_world_camera.matrix());
     }
@@ -97,7 +97,7 @@ TEST(Relocaliser, FindsTheCameraAlongTheMotionAndNeverAWrongPlace) {
     elsewhere.seed = 5;
     Simulator other(elsewhere);
     while (const auto frame = other.next())
-      EXPECT_FALSE(relocaliser.find(frame->image, known.filter, known.map))
+      EXPECT_FALSE(relocaliser.find(simulator.camera(), frame->image, known.filter, known.map))
           << scene << " " << frame->index;
   }
 }
@@ -109,19 +109,15 @@ TEST(Relocaliser, SeesThroughTheLensAsItIsKnownByNow) {
   faulty.fy *= 1.05;
   LensCorrection fault;
   fault.focal = 1.0 / 1.05 - 1.0;
-  const auto relocaliserFor = [](const CameraModel& camera) {
-    return Relocaliser(camera, RelocaliserOptions(), MapOptions(), ImageOptions());
-  };
-  const Relocaliser right = relocaliserFor(simulator.camera());
-  Relocaliser learning = relocaliserFor(CameraModel(faulty));
+  const Relocaliser relocaliser({}, {}, {});
+  const CameraModel given(faulty);
   KnownMap known;
   addFeatures(simulator, *simulator.next(), &known);
   const cv::Mat image = simulator.next()->image;
-  const auto expected = right.find(image, known.filter, known.map);
+  const auto expected = relocaliser.find(simulator.camera(), image, known.filter, known.map);
   ASSERT_TRUE(expected);
-  const auto by_fault = learning.find(image, known.filter, known.map);
-  learning.setCamera(CameraModel(faulty).corrected(fault));
-  const auto learnt = learning.find(image, known.filter, known.map);
+  const auto by_fault = relocaliser.find(given, image, known.filter, known.map);
+  const auto learnt = relocaliser.find(given.corrected(fault), image, known.filter, known.map);
   ASSERT_TRUE(learnt);
   const auto distance = [&expected](const Relocalisation& place) {
     return (place.T_world_camera.translation() - expected->T_world_camera.translation()).norm();
@@ -134,12 +130,12 @@ TEST(Relocaliser, SeesThroughTheLensAsItIsKnownByNow) {
 
 TEST(Relocaliser, SaysNothingOfAnEmptyMapOrABlankOrForeignImage) {
   const CameraModel camera(makeSimulatedCalibration(320, 240, "none"));
-  const Relocaliser relocaliser(camera, RelocaliserOptions(), MapOptions(), ImageOptions());
+  const Relocaliser relocaliser({}, {}, {});
   const KnownMap known;
-  EXPECT_FALSE(
-      relocaliser.find(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), known.filter, known.map));
-  EXPECT_FALSE(relocaliser.find(cv::Mat(), known.filter, known.map));
-  EXPECT_FALSE(relocaliser.find(cv::Mat(240, 320, CV_8UC3), known.filter, known.map));
+  EXPECT_FALSE(relocaliser.find(camera, cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), known.filter,
+                                known.map));
+  EXPECT_FALSE(relocaliser.find(camera, cv::Mat(), known.filter, known.map));
+  EXPECT_FALSE(relocaliser.find(camera, cv::Mat(240, 320, CV_8UC3), known.filter, known.map));
 }
 
 TEST(Relocaliser, RefusesSettingsOutOfRange) {

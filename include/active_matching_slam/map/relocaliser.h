@@ -39,16 +39,12 @@ struct Relocalisation {
 class Relocaliser {
  public:
   /// Throws as the check functions.
-  Relocaliser(const CameraModel& camera, const RelocaliserOptions& options, const MapOptions& map,
-              const ImageOptions& image);
+  Relocaliser(const RelocaliserOptions& options, const MapOptions& map, const ImageOptions& image);
 
-  /// The same camera, its lens as known by now.
-  void setCamera(const CameraModel& camera) { camera_ = camera; }
-
-  /// `image`: 8-bit grey of the camera's size. Empty when the place can't be told with certainty.
-  /// The camera of `filter` plays no part.
-  std::optional<Relocalisation> find(const cv::Mat& image, const Ekf& filter,
-                                     const FeatureMap& map) const;
+  /// `camera`: with its lens as known by now. `image`: 8-bit grey of the camera's size. Empty when
+  /// the place can't be told with certainty. The camera of `filter` plays no part.
+  std::optional<Relocalisation> find(const CameraModel& camera, const cv::Mat& image,
+                                     const Ekf& filter, const FeatureMap& map) const;
 
   /// Whether enough features have a known depth; else find() would search for ever in vain.
   bool canFind(const Ekf& filter, const FeatureMap& map) const;
@@ -65,17 +61,18 @@ class Relocaliser {
   std::vector<Landmark> usableLandmarks(const Ekf& filter, const FeatureMap& map) const;
   std::vector<Sighting> matchDescriptors(const cv::Mat& image,
                                          const std::vector<Landmark>& landmarks) const;
-  std::optional<Eigen::Isometry3d> solvePose(const std::vector<Sighting>& sightings) const;
+  std::optional<Eigen::Isometry3d> solvePose(const CameraModel& camera,
+                                             const std::vector<Sighting>& sightings) const;
   /// Searches all that should be seen within `radius_px`; returns how many that are.
-  int searchVisible(const cv::Mat& image, const std::vector<Landmark>& landmarks,
-                    const Eigen::Isometry3d& T_world_camera, double radius_px,
-                    std::vector<Sighting>* found) const;
-  Eigen::Isometry3d refinePose(const std::vector<Sighting>& sightings,
+  int searchVisible(const CameraModel& camera, const cv::Mat& image,
+                    const std::vector<Landmark>& landmarks, const Eigen::Isometry3d& T_world_camera,
+                    double radius_px, std::vector<Sighting>* found) const;
+  Eigen::Isometry3d refinePose(const CameraModel& camera, const std::vector<Sighting>& sightings,
                                Eigen::Isometry3d T_world_camera) const;
   /// Distance of a sighting from where the pose predicts it; infinite when it predicts none.
-  double residual(const Sighting& sighting, const Eigen::Isometry3d& T_world_camera) const;
+  double residual(const CameraModel& camera, const Sighting& sighting,
+                  const Eigen::Isometry3d& T_world_camera) const;
 
-  CameraModel camera_;
   RelocaliserOptions options_;
   MapOptions map_options_;
   ImageOptions image_options_;
