@@ -230,6 +230,10 @@ void StartAdjustment::add(std::int64_t index, double interval_s, const CameraSta
   thinOut();
 }
 
+void StartAdjustment::rescale(double factor) {
+  for (Image& image : images_) image.camera.position_world *= factor;
+}
+
 /// The last image but two goes when it shows nothing new; all but every other go when there are too
 /// many.
 void StartAdjustment::thinOut() {

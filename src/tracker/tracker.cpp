@@ -62,6 +62,7 @@ void Tracker::Implementation::setScale(double factor) {
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   filter_.rescale(factor);
   map_.rescale(factor);
+  start_adjustment_.rescale(factor);
   T_world_camera_before_.translation() *= factor;
   scale_source_ = ScaleSource::kService;
 }

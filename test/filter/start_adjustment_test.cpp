@@ -24,15 +24,31 @@ class StartOfATrack {
 
   /// What the images up to `image` make of it; nothing is adjusted before the last.
   std::optional<AdjustedStart> adjustAfter(int image) {
-    for (int k = 1; k <= image; ++k) {
+    show(image);
+    return adjustment_.adjust(model_, filter_);
+  }
+
+  /// All images not yet shown up to `image`.
+  void show(int image) {
+    for (; shown_ < image; ++shown_) {
       std::vector<FeatureMeasurement> seen;
-      for (const BundleObservation& o : truth_.observations[k]) {
+      for (const BundleObservation& o : truth_.observations[shown_ + 1]) {
         const auto it = std::find(place_of_id_.begin(), place_of_id_.end(), o.feature);
         if (it != place_of_id_.end()) seen.push_back({it - place_of_id_.begin(), o.pixel, 0.0});
       }
-      adjustment_.add(k, 1.0 / 30.0, filter_.camera(), seen);
+      adjustment_.add(shown_ + 1, 1.0 / 30.0, filter_.camera(), seen);
     }
-    return adjustment_.adjust(model_, filter_);
+  }
+
+  void believeIn(const Eigen::Vector3d& position_world) {
+    CameraState camera = filter_.camera();
+    camera.position_world = position_world;
+    filter_.restore(camera, filter_.features(), filter_.covariance(), filter_.nextId());
+  }
+
+  void rescale(double factor) {
+    filter_.rescale(factor);
+    adjustment_.rescale(factor);
   }
 
   static FilterOptions options() {
@@ -51,6 +67,7 @@ class StartOfATrack {
   Ekf filter_;
   StartAdjustment adjustment_;
   std::vector<int> place_of_id_;  ///< in the bundle
+  int shown_ = 0;                 ///< the last image
 };
 
 Bundle track(int images, double step_m, unsigned seed) {
@@ -127,6 +144,32 @@ TEST(StartAdjustment, AFeatureThatWandersIsLeftOut) {
   for (const FeatureState& feature : adjusted->features)
     EXPECT_NE(start.featureOf(feature.id), wanderer);
   EXPECT_GT(adjusted->features.size(), truth.observations.front().size() / 2);
+}
+
+TEST(StartAdjustment, AScaleThatIsSetMeanwhileHoldsForEarlierImagesToo) {
+  const Bundle truth = track(12, 0.02, 6);
+  StartOfATrack start(truth);
+  constexpr double kFactor = 3.0;
+  constexpr int kSet = 5;
+  const Eigen::Vector3d believed(0.02, 0.0, -0.01);
+  start.believeIn(believed);
+  start.show(kSet);
+  start.rescale(kFactor);
+  const auto adjusted = start.adjustAfter(11);
+  ASSERT_TRUE(adjusted);
+  std::vector<double> inverse_depths;
+  for (const FeatureState& feature : adjusted->features)
+    inverse_depths.push_back(feature.inverse_depth);
+  std::sort(inverse_depths.begin(), inverse_depths.end());
+  EXPECT_NEAR(kFactor * inverse_depths[inverse_depths.size() / 2], 1.0, 0.05);
+  // A patch taken from where that camera was believed to be is now where the camera was.
+  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
+  T_world_camera.translation() = kFactor * believed;
+  const double scale =
+      adjusted->camera.position_world.norm() / truth.cameras[11].position_world.norm();
+  const Eigen::Vector3d place = scale * truth.cameras[kSet].position_world;
+  EXPECT_LT((adjusted->corrected(kSet, T_world_camera).translation() - place).norm(),
+            0.1 * place.norm());
 }
 
 TEST(StartAdjustment, EndsWhenTheFirstImageIsOutOfSight) {

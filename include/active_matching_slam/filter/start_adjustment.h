@@ -49,6 +49,9 @@ class StartAdjustment {
   /// Joins to the last image features that it showed first, numbered above all before.
   void addFirstSights(const std::vector<FeatureMeasurement>& measurements);
 
+  /// Takes all lengths so far times `factor`, as the filter does when its scale becomes known.
+  void rescale(double factor);
+
   /// The adjusted state when it is time for one and the images leave no doubt. `model` as
   /// calibrated; the readout is adjusted too.
   std::optional<AdjustedStart> adjust(const CameraModel& model, const Ekf& filter);
