@@ -40,6 +40,7 @@ class StartOfATrack {
     }
   }
 
+  /// Puts the filter's camera there, as it will be taken to be in the images to come.
   void believeIn(const Eigen::Vector3d& position_world) {
     CameraState camera = filter_.camera();
     camera.position_world = position_world;
@@ -74,6 +75,19 @@ Bundle track(int images, double step_m, unsigned seed) {
   return exampleBundle(CameraModel(exampleCalibration()), images, 40, step_m, 0.2, seed);
 }
 
+double medianInverseDepth(const AdjustedStart& adjusted) {
+  std::vector<double> inverse_depths;
+  for (const FeatureState& feature : adjusted.features)
+    inverse_depths.push_back(feature.inverse_depth);
+  std::sort(inverse_depths.begin(), inverse_depths.end());
+  return inverse_depths[inverse_depths.size() / 2];
+}
+
+/// Length of the adjusted way by that of the true one.
+double scaleOf(const AdjustedStart& adjusted, const Bundle& truth) {
+  return adjusted.camera.position_world.norm() / truth.cameras.back().position_world.norm();
+}
+
 TEST(StartAdjustment, FindsTheMoveThatTheFilterMissed) {
   const Bundle truth = track(12, 0.02, 1);
   StartOfATrack start(truth);
@@ -82,17 +96,12 @@ TEST(StartAdjustment, FindsTheMoveThatTheFilterMissed) {
   EXPECT_GT(cosineBetween(adjusted->camera.position_world, truth.cameras[11].position_world), 0.99);
   EXPECT_LT(adjusted->camera.q_world_camera.angularDistance(truth.cameras[11].q_world_camera),
             0.01);
-  const double scale =
-      adjusted->camera.position_world.norm() / truth.cameras[11].position_world.norm();
+  const double scale = scaleOf(*adjusted, truth);
   const Eigen::Vector3d velocity =
       30.0 * (truth.cameras[11].position_world - truth.cameras[10].position_world);
   EXPECT_LT((adjusted->camera.velocity_world / scale - velocity).norm(), 0.2 * velocity.norm());
   // The unit of length: the median depth is what it was.
-  std::vector<double> inverse_depths;
-  for (const FeatureState& feature : adjusted->features)
-    inverse_depths.push_back(feature.inverse_depth);
-  std::sort(inverse_depths.begin(), inverse_depths.end());
-  EXPECT_NEAR(inverse_depths[inverse_depths.size() / 2], 1.0, 0.05);
+  EXPECT_NEAR(medianInverseDepth(*adjusted), 1.0, 0.05);
   // The state is one that a filter takes, and its errors are within its covariance.
   start.filter().restore(adjusted->camera, adjusted->features, adjusted->covariance, 1000);
   double sum = 0.0;
@@ -157,17 +166,11 @@ TEST(StartAdjustment, AScaleThatIsSetMeanwhileHoldsForEarlierImagesToo) {
   start.rescale(kFactor);
   const auto adjusted = start.adjustAfter(11);
   ASSERT_TRUE(adjusted);
-  std::vector<double> inverse_depths;
-  for (const FeatureState& feature : adjusted->features)
-    inverse_depths.push_back(feature.inverse_depth);
-  std::sort(inverse_depths.begin(), inverse_depths.end());
-  EXPECT_NEAR(kFactor * inverse_depths[inverse_depths.size() / 2], 1.0, 0.05);
+  EXPECT_NEAR(kFactor * medianInverseDepth(*adjusted), 1.0, 0.05);
   // A patch taken from where that camera was believed to be is now where the camera was.
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
   T_world_camera.translation() = kFactor * believed;
-  const double scale =
-      adjusted->camera.position_world.norm() / truth.cameras[11].position_world.norm();
-  const Eigen::Vector3d place = scale * truth.cameras[kSet].position_world;
+  const Eigen::Vector3d place = scaleOf(*adjusted, truth) * truth.cameras[kSet].position_world;
   EXPECT_LT((adjusted->corrected(kSet, T_world_camera).translation() - place).norm(),
             0.1 * place.norm());
 }
