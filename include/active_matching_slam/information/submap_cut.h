@@ -1,0 +1,24 @@
+#pragma once
+
+#include "active_matching_slam/information/submap_partition.h"
+
+namespace active_matching_slam {
+
+/// `submaps` (1 or more) parts of the hierarchy's tree that preserve as much information as can be
+/// found: links of the tree are cut one by one, each time the one that costs least, and then
+/// exchanged as long as that gains. What remains in one piece alone preserves the more the larger
+/// it is, so no cut leaves a part with less than 1 / (3 submaps - 2) of the features: a quarter for
+/// two submaps, a third of an equal share for many. (Only where no such cut is left may parts be
+/// half as large, and so on.)
+///
+/// partitionIntoSubmaps() takes the tree's links in the order of the hierarchy instead, so that its
+/// partitions contain the levels and one another; but a cluster that took its strongest link in an
+/// early round is bound by it, however much a later one would hold together.
+///
+/// Fewer submaps than the graph has connected parts, or more than it has features, can't be: the
+/// nearest possible number is returned. Throws std::invalid_argument as partitionIntoSubmaps()
+/// does. O(submaps (links + features submaps)) for each sweep of exchanges, of which there are few.
+SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
+                               const SubmapHierarchy& hierarchy, int submaps);
+
+}  // namespace active_matching_slam

@@ -1,0 +1,198 @@
+#include "active_matching_slam/information/submap_cut.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+namespace active_matching_slam {
+namespace {
+
+constexpr int kMostSweeps = 20;      ///< of exchanges
+constexpr double kLeastGain = 1e-9;  ///< of an exchange, of all information
+constexpr int kNone = -1;
+
+/// A cut of the link from a node to its parent, and by how much it changes what is preserved.
+struct Cut {
+  int node = kNone;
+  double change_bits = -std::numeric_limits<double>::infinity();
+};
+
+/// The hierarchy's tree (or forest), each node under its parent, some links of which are cut.
+class CutTree {
+ public:
+  CutTree(std::vector<WeightedEdge> edges, const SubmapHierarchy& hierarchy)
+      : edges_(std::move(edges)), nodes_(static_cast<int>(hierarchy.ids.size())) {
+    grow(hierarchy.merges);
+    for (const WeightedEdge& edge : edges_) meeting_.push_back(meetingOf(edge));
+    label();
+  }
+
+  int parts() const { return parts_; }
+  bool hasLink(int node) const { return parent_[node] != kNone; }
+  bool isCut(int node) const { return is_cut_[node] != 0; }
+  double preserved() const { return preservedInformation(edges_, labels_, parts_); }
+  void setCut(int node, bool is_cut) {
+    is_cut_[node] = is_cut ? 1 : 0;
+    label();
+  }
+
+  /// The cut that costs least of those that leave no part below `least` features.
+  Cut best(double least) const {
+    Eigen::VectorXd crossing = Eigen::VectorXd::Zero(nodes_);  // all that a cut separates [bits]
+    Eigen::VectorXi size = Eigen::VectorXi::Ones(nodes_);
+    // The strongest link [bits] of what hangs below a node, and of its own, to each other part;
+    // among node and children the strongest and the next.
+    Eigen::MatrixXd strongest = Eigen::MatrixXd::Zero(parts_, nodes_), next = strongest;
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      const auto& [a, b, bits] = edges_[e];
+      if (!(bits > 0.0)) continue;
+      if (labels_[a] == labels_[b]) {
+        crossing[a] += bits;
+        crossing[b] += bits;
+        crossing[meeting_[e]] -= 2.0 * bits;
+      } else {
+        strongest(labels_[b], a) = std::max(strongest(labels_[b], a), bits);
+        strongest(labels_[a], b) = std::max(strongest(labels_[a], b), bits);
+      }
+    }
+    for (auto node = order_.rbegin(); node != order_.rend(); ++node) {
+      if (isTop(*node)) continue;
+      const int parent = parent_[*node];
+      crossing[parent] += crossing[*node];
+      size[parent] += size[*node];
+      next.col(parent) =
+          next.col(parent).cwiseMax(strongest.col(parent).cwiseMin(strongest.col(*node)));
+      strongest.col(parent) = strongest.col(parent).cwiseMax(strongest.col(*node));
+    }
+    Eigen::MatrixXd outside = Eigen::MatrixXd::Zero(parts_, nodes_);  // of all not below a node
+    std::vector<int> whole(nodes_);                                   // size of a node's part
+    Cut best;
+    for (const int node : order_) {
+      whole[node] = isTop(node) ? size[node] : whole[parent_[node]];
+      if (isTop(node)) continue;
+      const int parent = parent_[node];
+      const auto is_here = strongest.col(node).array() == strongest.col(parent).array();
+      outside.col(node) =
+          outside.col(parent).cwiseMax(is_here.select(next.col(parent), strongest.col(parent)));
+      if (size[node] < least || whole[node] - size[node] < least) continue;
+      // Of the links between the two sides the strongest stays, which is the one of the tree. To
+      // other parts each side now has a strongest of its own: the weaker of them is won.
+      const double change =
+          link_bits_[node] - crossing[node] + strongest.col(node).cwiseMin(outside.col(node)).sum();
+      if (change > best.change_bits) best = {node, change};
+    }
+    return best;
+  }
+
+  SubmapPartition partition() const {
+    DisjointSets sets(nodes_);
+    for (int node = 0; node < nodes_; ++node)
+      if (!isTop(node)) sets.unite(node, parent_[node]);
+    SubmapPartition partition;
+    partition.submap_of_feature = sets.labels();
+    partition.submaps = sets.count();
+    partition.preserved = preserved();
+    return partition;
+  }
+
+ private:
+  bool isTop(int node) const { return parent_[node] == kNone || is_cut_[node] != 0; }
+
+  void grow(const std::vector<SubmapMerge>& merges) {
+    std::vector<std::vector<std::pair<int, double>>> neighbours(nodes_);
+    for (const SubmapMerge& merge : merges) {
+      neighbours[merge.first].emplace_back(merge.second, merge.information_bits);
+      neighbours[merge.second].emplace_back(merge.first, merge.information_bits);
+    }
+    parent_.assign(nodes_, kNone);
+    link_bits_.assign(nodes_, 0.0);
+    depth_.assign(nodes_, 0);
+    is_cut_.assign(nodes_, 0);
+    std::vector<char> is_known(nodes_, 0);
+    for (int root = 0; root < nodes_; ++root) {
+      if (is_known[root]) continue;
+      is_known[root] = 1;
+      std::size_t at = order_.size();
+      for (order_.push_back(root); at < order_.size(); ++at) {
+        const int node = order_[at];
+        for (const auto& [neighbour, bits] : neighbours[node]) {
+          if (is_known[neighbour]) continue;
+          is_known[neighbour] = 1;
+          parent_[neighbour] = node;
+          link_bits_[neighbour] = bits;
+          depth_[neighbour] = depth_[node] + 1;
+          order_.push_back(neighbour);
+        }
+      }
+    }
+  }
+
+  /// The lowest node above both ends. All links lie inside a connected part of the graph.
+  int meetingOf(const WeightedEdge& edge) const {
+    int a = edge.first, b = edge.second;
+    while (a != b) {
+      int& deeper = depth_[a] >= depth_[b] ? a : b;
+      if (parent_[deeper] == kNone) return kNone;  // a link without information: no link
+      deeper = parent_[deeper];
+    }
+    return a;
+  }
+
+  void label() {
+    labels_.resize(nodes_);
+    parts_ = 0;
+    for (const int node : order_) labels_[node] = isTop(node) ? parts_++ : labels_[parent_[node]];
+  }
+
+  std::vector<WeightedEdge> edges_;
+  int nodes_;
+  std::vector<int> order_;         ///< parents first
+  std::vector<int> parent_;        ///< per node, or kNone
+  std::vector<double> link_bits_;  ///< per node, of the link to its parent
+  std::vector<int> depth_;
+  std::vector<char> is_cut_;  ///< per node, the link to its parent
+  std::vector<int> meeting_;  ///< per edge
+  std::vector<int> labels_;   ///< per node
+  int parts_ = 0;
+};
+
+}  // namespace
+
+SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
+                               const SubmapHierarchy& hierarchy, int submaps) {
+  SubmapPartition of_hierarchy = partitionIntoSubmaps(graph, hierarchy, submaps);
+  const int features = static_cast<int>(hierarchy.ids.size());
+  if (of_hierarchy.submaps == features) return of_hierarchy;
+
+  std::vector<WeightedEdge> edges = graphEdges(graph);
+  double total_bits = 0.0;
+  for (const WeightedEdge& edge : edges) total_bits += std::max(0.0, edge.weight);
+  CutTree tree(std::move(edges), hierarchy);
+  double least = features / (3.0 * submaps - 2.0);
+  while (tree.parts() < of_hierarchy.submaps) {
+    const Cut cut = tree.best(least);
+    if (cut.node == kNone) {
+      least /= 2.0;
+    } else {
+      tree.setCut(cut.node, true);
+    }
+  }
+  bool has_gained = true;
+  for (int sweep = 0; sweep < kMostSweeps && has_gained; ++sweep) {
+    has_gained = false;
+    for (int node = 0; node < features; ++node) {
+      if (!tree.hasLink(node) || !tree.isCut(node)) continue;
+      const double preserved = tree.preserved();
+      tree.setCut(node, false);
+      const Cut cut = tree.best(least);
+      const bool gains = cut.node != kNone &&
+                         tree.preserved() + cut.change_bits / total_bits > preserved + kLeastGain;
+      tree.setCut(gains ? cut.node : node, true);
+      has_gained |= gains;
+    }
+  }
+  return tree.partition();
+}
+
+}  // namespace active_matching_slam
