@@ -215,6 +215,14 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
   }
 }
 
+/// Derivative, by the cameras' errors, of the factor by which their way fits itself best.
+Eigen::VectorXd wayFunctional(const Bundle& bundle, int size) {
+  Eigen::VectorXd way = Eigen::VectorXd::Zero(size);
+  for (std::size_t k = 1; k < bundle.cameras.size(); ++k)
+    way.segment<3>(6 * static_cast<Eigen::Index>(k - 1)) = bundle.cameras[k].position_world;
+  return way / way.squaredNorm();
+}
+
 }  // namespace
 
 double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle) {
@@ -244,7 +252,7 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
 }
 
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
-                                 const Bundle& bundle, int first_camera,
+                                 const Bundle& bundle, int first_camera, BundleUnit unit,
                                  double relative_scale_sigma) {
   const NormalEquations N = linearise(model, options, bundle);
   const LensVector lens_information = calibrationInformation(options).tail<kLensSize>();
@@ -256,11 +264,9 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   // M^T M + diag(0, B^T B), where M = R^-1 [1, -W L^-T B].
   Eigen::MatrixXd M(cameras, kept + 3 * F);
   M.leftCols(kept) = Eigen::MatrixXd::Identity(cameras, cameras).rightCols(kept);
-  Eigen::VectorXd scale = Eigen::VectorXd::Zero(M.cols());
   for (int i = 0; i < F; ++i) {
     M.middleCols<3>(kept + 3 * i).noalias() =
         -reduced->cross.middleCols<3>(3 * i).lazyProduct(reduced->inverse_roots[i]);
-    scale[kept + 3 * i + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
   }
   reduced->factor.matrixL().solveInPlace(M);
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(M.cols(), M.cols());
@@ -269,9 +275,21 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   for (int i = 0; i < F; ++i)
     covariance.block<3, 3>(kept + 3 * i, kept + 3 * i) +=
         reduced->inverse_roots[i].transpose() * reduced->inverse_roots[i];
-  // The unit is known as well as said: one more measurement, of the mean of the logarithms.
-  const Eigen::VectorXd along = lower * scale;
-  lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + scale.dot(along)));
+  // The unit is known as well as said: one more measurement.
+  Eigen::VectorXd along;
+  double variance = 0.0;
+  if (unit == BundleUnit::kWay) {
+    const Eigen::VectorXd way = reduced->factor.matrixL().solve(wayFunctional(bundle, cameras));
+    along = M.transpose() * way;
+    variance = way.squaredNorm();
+  } else {
+    Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.cols());
+    for (int i = 0; i < F; ++i)
+      depths[kept + 3 * i + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
+    along = lower * depths;
+    variance = depths.dot(along);
+  }
+  lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + variance));
   covariance.triangularView<Eigen::StrictlyUpper>() = covariance.transpose();
   return covariance;
 }

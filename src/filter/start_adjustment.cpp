@@ -10,27 +10,28 @@
 namespace active_matching_slam {
 namespace {
 
-/// Parallax to the first image [px]: adjusted first at, then whenever it has grown by a factor, and
-/// no more beyond.
-constexpr double kFirstParallaxPx = 0.5, kParallaxGrowth = 2.0, kLastParallaxPx = 16.0;
+/// Parallax: adjusted first at [sigma of the noise of image points], and no more beyond.
+constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 16.0;
+constexpr double kGrowth = 1.3;         ///< of parallax or time from one adjustment to the next
+constexpr double kTellingGrowth = 2.0;  ///< of parallax, until readings are told apart again
 /// By so much wider than that of a new feature is the prior of depths while readings are told
 /// apart: in a scene that goes from near to far it would rather bend the motion than let depths
 /// differ.
 constexpr double kDepthFreedom = 10.0;
 /// Prior of depths in the end, by how far apart they turned out to be (median).
 constexpr double kDepthSpread = 2.0;
-constexpr double kGrowthInDoubt = 1.25;    ///< the factor when the images leave a doubt
 constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
 constexpr std::size_t kMostImages = 24;    ///< kept
 constexpr std::size_t kLeastPoints = 8;    ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;         ///< of a feature that takes part
 constexpr double kLeastCostGap = 12.0;     ///< to the next reading; odds of e^6
 constexpr double kMostCostPerPoint = 4.0;  ///< of 2 expected: beyond, things move or matches lie
-constexpr double kLeastNoiseShare =
-    0.05;  ///< of the assumed variance that images are credited with
+/// Of the assumed variance: images are credited with no less.
+constexpr double kLeastNoiseShare = 0.05;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
 constexpr double kSameDirection = 0.8;  ///< cosine between two readings' moves that are one
 constexpr double kScaleSigma = 1e-3;    ///< of the free unit, relative
+constexpr double kMostMisread = 0.1;    ///< of a way's square that a change of unit leaves
 
 double medianOf(std::vector<double> values) {
   if (values.empty()) return 0.0;
@@ -69,10 +70,14 @@ bool isSameReading(const Bundle& a, const Bundle& b) {
 /// The same feature, anchored at the origin.
 FeatureState seenFromOrigin(const FeatureState& feature) {
   FeatureState seen = feature;
-  const Eigen::Vector3d ray = feature.inverse_depth * feature.anchor_world + feature.bearing_world;
+  const bool is_point = feature.kind == FeatureKind::kPoint;
+  const double weight = is_point ? 1.0 : feature.inverse_depth;
+  const Eigen::Vector3d ray =
+      is_point ? feature.point_world : weight * feature.anchor_world + feature.bearing_world;
+  seen.kind = FeatureKind::kInverseDepth;
   seen.anchor_world.setZero();
   seen.bearing_world = ray.normalized();
-  seen.inverse_depth = feature.inverse_depth / ray.norm();
+  seen.inverse_depth = weight / ray.norm();
   const Eigen::Vector3d& m = seen.bearing_world;
   const Eigen::Vector3d axis =
       std::abs(m.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
@@ -134,7 +139,7 @@ void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle) {
   }
 }
 
-void rescale(double factor, Bundle* bundle) {
+void rescaleBundle(double factor, Bundle* bundle) {
   for (FeatureState& feature : bundle->features) feature.inverse_depth /= factor;
   for (CameraState& camera : bundle->cameras) camera.position_world *= factor;
 }
@@ -143,7 +148,7 @@ void rescale(double factor, Bundle* bundle) {
 void normalise(double inverse_depth, Bundle* bundle) {
   std::vector<double> values;
   for (const FeatureState& feature : bundle->features) values.push_back(feature.inverse_depth);
-  if (!values.empty()) rescale(medianOf(std::move(values)) / inverse_depth, bundle);
+  if (!values.empty()) rescaleBundle(medianOf(std::move(values)) / inverse_depth, bundle);
 }
 
 /// Median distance of the inverse depths to one.
@@ -154,13 +159,70 @@ double medianDeviation(const Bundle& bundle, double inverse_depth) {
   return medianOf(std::move(deviations));
 }
 
-/// Scales the bundle to the unit of length of `before`: the median of the inverse depths stays.
-void keepUnit(const Bundle& before, Bundle* bundle) {
+/// The factor by which the way of the cameras comes nearest to what it was. Zero when it was
+/// misread.
+double wayFactor(const Bundle& before, const Bundle& bundle) {
+  double product = 0.0, square = 0.0, square_before = 0.0;
+  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
+    const Eigen::Vector3d& was = before.cameras[k].position_world;
+    const Eigen::Vector3d& is = bundle.cameras[k].position_world;
+    product += is.dot(was);
+    square += is.squaredNorm();
+    square_before += was.squaredNorm();
+  }
+  if (!(product * product > (1.0 - kMostMisread) * square * square_before)) return 0.0;
+  return std::max(0.0, product / square);
+}
+
+/// The factor by which the median of the inverse depths stays.
+double depthFactor(const Bundle& before, const Bundle& bundle) {
   std::vector<double> logarithms;
-  for (std::size_t i = 0; i < bundle->features.size(); ++i)
+  for (std::size_t i = 0; i < bundle.features.size(); ++i)
     logarithms.push_back(
-        std::log(bundle->features[i].inverse_depth / before.features[i].inverse_depth));
-  rescale(std::exp(medianOf(std::move(logarithms))), bundle);
+        std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth));
+  return std::exp(medianOf(std::move(logarithms)));
+}
+
+/// Whether every image shows enough, and shares enough with the one before to hang together.
+bool isConnected(const Bundle& bundle) {
+  std::vector<bool> before(bundle.features.size());
+  for (std::size_t k = 0; k < bundle.observations.size(); ++k) {
+    std::vector<bool> here(bundle.features.size());
+    std::size_t common = 0;
+    for (const BundleObservation& o : bundle.observations[k]) {
+      here[o.feature] = true;
+      common += k == 0 || before[o.feature];
+    }
+    if (common < kLeastPoints) return false;
+    before.swap(here);
+  }
+  return true;
+}
+
+/// Median angle [px] between two images that no turn explains. Empty when they share too little.
+std::optional<double> parallaxBetween(const CameraModel& model,
+                                      const std::vector<FeatureMeasurement>& from,
+                                      const std::vector<FeatureMeasurement>& to) {
+  Bundle pair;
+  pair.cameras.resize(2);
+  pair.observations.resize(2);
+  for (const FeatureMeasurement& m : to) {
+    const FeatureMeasurement* first = find(from, m.id);
+    const auto ray = first ? model.unproject(first->pixel) : std::nullopt;
+    if (!ray) continue;
+    FeatureState feature;
+    feature.bearing_world = ray->normalized();
+    pair.observations[1].push_back({static_cast<int>(pair.features.size()), m.pixel});
+    pair.features.push_back(feature);
+  }
+  if (pair.features.size() < kLeastPoints) return std::nullopt;
+  alignRotation(model, 1, &pair);
+  const Eigen::Matrix3d R = pair.cameras[1].q_world_camera.toRotationMatrix();
+  std::vector<double> angles;
+  for (const BundleObservation& o : pair.observations[1])
+    if (const auto ray = model.unproject(o.pixel))
+      angles.push_back((R * ray->normalized() - pair.features[o.feature].bearing_world).norm());
+  return medianOf(std::move(angles)) * model.calibration().fx;
 }
 
 /// Takes out features that are no points of the scene: their image points are outliers on the
@@ -188,6 +250,28 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
   }
 }
 
+/// Adjusts all of `reading`, first by the noise assumed and then by that which it shows, and leaves
+/// features that wander out of it, of `believed` and of `ids`. `options` keeps the lower noise.
+void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* reading,
+                      Bundle* believed, std::vector<FeatureId>* ids) {
+  options->sigma_inverse_depth =
+      std::max(options->sigma_inverse_depth,
+               kDepthSpread * medianDeviation(*reading, options->inverse_depth));
+  adjustBundle(model, *options, reading);
+  // Corners where something near hides something far wander by less than would make them outliers;
+  // most image points are much better than that.
+  const double equations = 2.0 * static_cast<double>(countPoints(*reading));
+  const double unknowns = 3.0 * static_cast<double>(ids->size()) +
+                          6.0 * static_cast<double>(reading->cameras.size() - 1);
+  const double freedom = std::max(equations - unknowns, 0.1 * equations);
+  const double scale = medianOf(featureErrors(model, *reading)) * std::sqrt(equations / freedom);
+  options->outlier_px =
+      std::clamp(kOutlierSigmas * scale, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
+  options->sigma_px = options->outlier_px / kOutlierSigmas;
+  adjustBundle(model, *options, reading);
+  dropWanderers(model, options->outlier_px, reading, believed, ids);
+}
+
 }  // namespace
 
 Eigen::Isometry3d AdjustedStart::corrected(std::int64_t image,
@@ -203,8 +287,11 @@ Eigen::Isometry3d AdjustedStart::corrected(std::int64_t image,
 void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasurement>& first) {
   is_active_ = true;
   images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
-  least_motion_px_ = 1.0;
-  next_parallax_px_ = kFirstParallaxPx;
+  features_.clear();
+  has_left_first_ = is_unit_known_ = false;
+  unit_drift_ = least_motion_px_ = 1.0;
+  last_parallax_px_ = next_parallax_px_ = next_telling_px_ = 0.0;
+  age_ = last_age_ = 0;
 }
 
 void StartAdjustment::addFirstSights(const std::vector<FeatureMeasurement>& measurements) {
@@ -214,10 +301,12 @@ void StartAdjustment::addFirstSights(const std::vector<FeatureMeasurement>& meas
   images_.back().speeds.resize(known.size(), Eigen::Vector2d::Zero());
 }
 
-void StartAdjustment::add(std::int64_t index, double interval_s, const CameraState& camera,
+void StartAdjustment::add(std::int64_t index, double interval_s, const Ekf& filter,
                           const std::vector<FeatureMeasurement>& measurements) {
   if (!is_active_) return;
-  Image image{index, interval_s, camera, measurements, zeros(measurements.size())};
+  ++age_;
+  rememberFeatures(filter);
+  Image image{index, interval_s, filter.camera(), measurements, zeros(measurements.size())};
   Image& before = images_.back();
   for (std::size_t i = 0; interval_s > 0.0 && i < measurements.size(); ++i) {
     const FeatureMeasurement* same = find(before.measurements, measurements[i].id);
@@ -231,7 +320,26 @@ void StartAdjustment::add(std::int64_t index, double interval_s, const CameraSta
 }
 
 void StartAdjustment::rescale(double factor) {
+  is_unit_known_ = true;
   for (Image& image : images_) image.camera.position_world *= factor;
+  for (FeatureState& feature : features_) {
+    feature.anchor_world *= factor;
+    feature.point_world *= factor;
+    feature.inverse_depth /= factor;
+  }
+}
+
+void StartAdjustment::rememberFeatures(const Ekf& filter) {
+  std::vector<FeatureState> known = filter.features();
+  for (const FeatureState& feature : features_)
+    if (filter.find(feature.id) == nullptr &&
+        std::any_of(images_.begin(), images_.end(), [&feature](const Image& image) {
+          return find(image.measurements, feature.id) != nullptr;
+        }))
+      known.push_back(feature);
+  std::sort(known.begin(), known.end(),
+            [](const FeatureState& a, const FeatureState& b) { return a.id < b.id; });
+  features_ = std::move(known);
 }
 
 /// The last image but two goes when it shows nothing new; all but every other go when there are too
@@ -251,39 +359,36 @@ void StartAdjustment::thinOut() {
   images_ = std::move(kept);
 }
 
-/// Median angle [px] to the first image that no turn explains. Empty when they share too little.
-std::optional<double> StartAdjustment::parallaxToFirst(const CameraModel& model,
-                                                       const Image& image) const {
-  Bundle pair;
-  pair.cameras.resize(2);
-  pair.observations.resize(2);
-  for (const FeatureMeasurement& m : image.measurements) {
-    const FeatureMeasurement* first = find(images_.front().measurements, m.id);
-    const auto ray = first ? model.unproject(first->pixel) : std::nullopt;
-    if (!ray) continue;
-    FeatureState feature;
-    feature.bearing_world = ray->normalized();
-    pair.observations[1].push_back({static_cast<int>(pair.features.size()), m.pixel});
-    pair.features.push_back(feature);
+/// Median angle [px] that no turn explains, of the last image to the first that shares enough with
+/// it. Empty when none does.
+std::optional<double> StartAdjustment::parallax(const CameraModel& model) {
+  for (std::size_t i = 0; i + 2 < images_.size(); ++i) {
+    const auto parallax_px =
+        parallaxBetween(model, images_[i].measurements, images_.back().measurements);
+    if (parallax_px) return parallax_px;
+    has_left_first_ = true;
   }
-  if (pair.features.size() < kLeastPoints) return std::nullopt;
-  alignRotation(model, 1, &pair);
-  const Eigen::Matrix3d R = pair.cameras[1].q_world_camera.toRotationMatrix();
-  std::vector<double> angles;
-  for (const BundleObservation& o : pair.observations[1])
-    if (const auto ray = model.unproject(o.pixel))
-      angles.push_back((R * ray->normalized() - pair.features[o.feature].bearing_world).norm());
-  return medianOf(std::move(angles)) * model.calibration().fx;
+  return std::nullopt;
 }
 
-Bundle StartAdjustment::makeBundle(const CameraModel& model, const Ekf& filter,
-                                   std::vector<FeatureId>* ids) const {
+/// Whether parallax is more than noise, and it or time have grown enough since last asked with so
+/// much.
+bool StartAdjustment::isTime(double parallax_px, double sigma_px) {
+  const bool has_aged = last_age_ > 0 && age_ > kGrowth * last_age_;
+  if (parallax_px < kFirstParallaxSigmas * sigma_px) return false;
+  if (parallax_px < next_parallax_px_ && !has_aged) return false;
+  next_parallax_px_ = std::max(next_parallax_px_, kGrowth * parallax_px);
+  last_age_ = age_;
+  return true;
+}
+
+Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const {
   Bundle bundle;
-  for (const FeatureState& feature : filter.features()) {
+  for (const FeatureState& feature : features_) {
     const auto sightings = std::count_if(
         images_.begin(), images_.end(),
         [&feature](const Image& image) { return find(image.measurements, feature.id) != nullptr; });
-    if (sightings < kLeastSightings || feature.kind != FeatureKind::kInverseDepth) continue;
+    if (sightings < kLeastSightings) continue;
     ids->push_back(feature.id);
     bundle.features.push_back(seenFromOrigin(feature));
   }
@@ -303,29 +408,12 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, const Ekf& filter,
   return bundle;
 }
 
-std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, const Ekf& filter) {
-  if (!is_active_ || images_.size() < 4) return std::nullopt;
-  const auto parallax = parallaxToFirst(model, images_.back());
-  if (parallax && *parallax < next_parallax_px_) return std::nullopt;
-  if (!parallax || *parallax >= kLastParallaxPx) end();
-
-  std::vector<FeatureId> ids;
-  Bundle believed = makeBundle(model, filter, &ids);
-  for (const auto& observations : believed.observations)
-    if (observations.size() < kLeastPoints) return std::nullopt;
-  BundleOptions options;
-  options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
-  options.sigma_px = filter.options().sigma_px;
-  options.inverse_depth = filter.options().initial_inverse_depth;
-  options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
-  options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
-  // So few images would bend the lens until depths fit their prior: it stays as calibrated.
-  options.sigma_calibration[0] = filter.options().initial_sigma_readout_s;
-
-  // Some of the images are enough to tell the readings apart.
-  Bundle rest = believed;
-  normalise(options.inverse_depth, &rest);  // a known scale may have been set
-  std::vector<Bundle> readings(2, someImages(rest));
+/// The reading of the images that is clearly the best, by some of them: what the filter believes, a
+/// camera that only turned, or one of these with near and far exchanged. Empty when in doubt.
+std::optional<Bundle> StartAdjustment::bestReading(const CameraModel& model,
+                                                   const BundleOptions& options,
+                                                   const Bundle& believed) const {
+  std::vector<Bundle> readings(2, someImages(believed));
   flatten(model, options.inverse_depth, &readings[1]);
   std::vector<double> costs;
   BundleOptions telling = options;
@@ -342,55 +430,91 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   const auto best =
       static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   // Images are often better than assumed.
-  const auto some_points = static_cast<double>(countPoints(readings[best]));
-  const double noise = std::clamp(costs[best] / (2.0 * some_points), kLeastNoiseShare, 1.0);
-  bool in_doubt = costs[best] > kMostCostPerPoint * some_points;
+  const auto points = static_cast<double>(countPoints(readings[best]));
+  const double noise = std::clamp(costs[best] / (2.0 * points), kLeastNoiseShare, 1.0);
+  if (costs[best] > kMostCostPerPoint * points) return std::nullopt;
   for (std::size_t i = 0; i < costs.size(); ++i)
-    in_doubt |= costs[i] < costs[best] + kLeastCostGap * noise &&
-                !isSameReading(readings[i], readings[best]);
-  if (parallax) next_parallax_px_ = (in_doubt ? kGrowthInDoubt : kParallaxGrowth) * *parallax;
-  if (in_doubt) return std::nullopt;
+    if (costs[i] < costs[best] + kLeastCostGap * noise &&
+        !isSameReading(readings[i], readings[best]))
+      return std::nullopt;
+  return allImages(readings[best], believed);
+}
 
-  options.sigma_inverse_depth =
-      std::max(options.sigma_inverse_depth,
-               kDepthSpread * medianDeviation(readings[best], options.inverse_depth));
-  Bundle reading = allImages(readings[best], rest);
-  adjustBundle(model, options, &reading);
-  // Corners where something near hides something far wander by less than would make them outliers;
-  // most image points are much better than that.
-  const double equations = 2.0 * static_cast<double>(countPoints(believed));
-  const double unknowns =
-      3.0 * static_cast<double>(ids.size()) + 6.0 * static_cast<double>(images_.size() - 1);
-  const double freedom = std::max(equations - unknowns, 0.1 * equations);
-  const double scale = medianOf(featureErrors(model, reading)) * std::sqrt(equations / freedom);
-  options.outlier_px =
-      std::clamp(kOutlierSigmas * scale, kLeastOutlierPx, kOutlierSigmas * options.sigma_px);
-  BundleOptions fine = options;
-  fine.sigma_px = options.outlier_px / kOutlierSigmas;
-  adjustBundle(model, fine, &reading);
-  dropWanderers(model, options.outlier_px, &reading, &believed, &ids);
-  keepUnit(believed, &reading);
-  options.sigma_px = std::min(options.sigma_px, fine.sigma_px);
-  auto start = makeState(model, filter, options, reading, ids);
-  if (!start) return std::nullopt;
+std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, const Ekf& filter) {
+  if (!is_active_ || images_.size() < 4) return std::nullopt;
+  const auto parallax_px = parallax(model);
+  if (!parallax_px) end();
+  if (!parallax_px || !isTime(*parallax_px, filter.options().sigma_px)) return std::nullopt;
+  if (*parallax_px >= kLastParallaxPx) end();
+
+  std::vector<FeatureId> ids;
+  Bundle believed = makeBundle(model, &ids);
+  if (!isConnected(believed)) return std::nullopt;
+  BundleOptions options;
+  options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
+  options.sigma_px = filter.options().sigma_px;
+  options.inverse_depth = filter.options().initial_inverse_depth;
+  options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
+  options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
+  // So few images would bend the lens until depths fit their prior: it stays as calibrated.
+  options.sigma_calibration[0] = filter.options().initial_sigma_readout_s;
+
+  Bundle reading = believed;
+  normalise(options.inverse_depth, &reading);  // a known scale may have been set
+  if (*parallax_px >= next_telling_px_) {
+    const auto best = bestReading(model, options, reading);
+    next_telling_px_ = best ? kTellingGrowth * *parallax_px : 0.0;
+    if (!best) return std::nullopt;
+    reading = *best;
+  }
+  adjustByItsNoise(model, &options, &reading, &believed, &ids);
+
+  // Others have seen the way, so that its unit stays, as far as it was known.
+  const double by_depths = depthFactor(believed, reading), by_way = wayFactor(believed, reading);
+  const bool keeps_way = (last_parallax_px_ > 0.0 || is_unit_known_) && by_way > 0.0;
+  double drift = unit_drift_;
+  if (keeps_way) {
+    drift *= by_way / by_depths;
+    if (!is_unit_known_)
+      drift = std::pow(drift, 1.0 / (1.0 + std::pow(options.sigma_px / last_parallax_px_, 2)));
+  }
+  rescaleBundle(by_depths * drift / unit_drift_, &reading);
+  auto start = makeState(model, filter, options, reading, ids,
+                         keeps_way ? BundleUnit::kWay : BundleUnit::kDepths);
+  if (start) {
+    adopt(reading, ids, &*start);
+    unit_drift_ = drift;
+    last_parallax_px_ = *parallax_px;
+  }
+  return start;
+}
+
+/// Cameras and features are from now on where `reading` has them; `start` hears of the moves.
+void StartAdjustment::adopt(const Bundle& reading, const std::vector<FeatureId>& ids,
+                            AdjustedStart* start) {
   for (std::size_t k = 0; k < images_.size(); ++k) {
     start->moves.push_back({images_[k].index, images_[k].camera.poseWorldCamera(),
                             reading.cameras[k].poseWorldCamera()});
     images_[k].camera = reading.cameras[k];
   }
-  return start;
+  auto feature = features_.begin();
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    while (feature->id != ids[i]) ++feature;  // both ascend
+    *feature = reading.features[i];
+  }
 }
 
 std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model, const Ekf& filter,
                                                         const BundleOptions& options,
                                                         const Bundle& bundle,
-                                                        const std::vector<FeatureId>& ids) const {
+                                                        const std::vector<FeatureId>& ids,
+                                                        BundleUnit unit) const {
   const int last = static_cast<int>(bundle.cameras.size()) - 1;
   const double dt = images_.back().interval_s;
   BundleOptions doubting_lens = options;
   doubting_lens.sigma_calibration = calibrationSigmas(filter.options());
   const Eigen::MatrixXd joint =
-      bundleCovariance(model, doubting_lens, bundle, last - 1, kScaleSigma);
+      bundleCovariance(model, doubting_lens, bundle, last - 1, unit, kScaleSigma);
   if (joint.size() == 0 || !joint.allFinite() || !(dt > 0.0)) return std::nullopt;
 
   AdjustedStart start;
@@ -418,24 +542,27 @@ std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model
   J.block<3, 3>(CameraError::kAngularVelocity, kLast + 3) = R_camera_world / dt;
   J.bottomRightCorner<CameraError::kCalibrationSize, CameraError::kCalibrationSize>().setIdentity();
 
-  const int F = static_cast<int>(ids.size());
+  std::vector<int> kept;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    if (filter.find(ids[i]) != nullptr) kept.push_back(static_cast<int>(i));
+  const int F = static_cast<int>(kept.size());
   start.covariance = Eigen::MatrixXd::Zero(CameraError::kSize + 6 * F, CameraError::kSize + 6 * F);
   auto camera = start.covariance.topLeftCorner<CameraError::kSize, CameraError::kSize>();
   camera = J * joint.topLeftCorner<kJoint, kJoint>() * J.transpose();
   camera = 0.5 * (camera + camera.transpose()).eval();
   for (int i = 0; i < F; ++i) {
-    FeatureState feature = bundle.features[i];
-    feature.id = ids[i];
+    FeatureState feature = bundle.features[kept[i]];
+    feature.id = ids[kept[i]];
     feature.offset = CameraError::kSize + 6 * i;
     start.features.push_back(feature);
-    const int row = feature.offset + FeatureError::kBearing, from = kJoint + 3 * i;
+    const int row = feature.offset + FeatureError::kBearing, from = kJoint + 3 * kept[i];
     auto columns = start.covariance.middleCols<3>(row);
     columns.topRows<CameraError::kSize>() = J * joint.block<kJoint, 3>(0, from);
     start.covariance.block<3, CameraError::kSize>(row, 0) =
         columns.topRows<CameraError::kSize>().transpose();
     for (int k = 0; k < F; ++k)
       columns.middleRows<3>(CameraError::kSize + 6 * k + FeatureError::kBearing) =
-          joint.block<3, 3>(kJoint + 3 * k, from);
+          joint.block<3, 3>(kJoint + 3 * kept[k], from);
   }
   const FilterOptions& noise = filter.options();
   start.covariance.diagonal().segment<3>(CameraError::kVelocity).array() +=

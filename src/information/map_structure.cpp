@@ -4,6 +4,8 @@ namespace active_matching_slam {
 
 void MapStructure::addFrame(const std::vector<std::int64_t>& ids,
                             const Eigen::Ref<const Eigen::MatrixXd>& S) {
+  if (is_outdated_) accumulator_.clear();
+  is_outdated_ = false;
   accumulator_.addFrame(ids, S);
 }
 
@@ -12,6 +14,7 @@ void MapStructure::keepOnly(const std::vector<std::int64_t>& ids) { accumulator_
 void MapStructure::clear() {
   accumulator_.clear();
   tracker_.clear();
+  is_outdated_ = false;
 }
 
 MapStructure::Snapshot MapStructure::snapshot() {
@@ -24,6 +27,7 @@ MapStructure::Snapshot MapStructure::snapshot() {
 void MapStructure::restore(const MutualInformationGraph& graph) {
   accumulator_ = MutualInformationAccumulator(graph);
   tracker_.clear();
+  is_outdated_ = false;
 }
 
 }  // namespace active_matching_slam

@@ -149,7 +149,7 @@ double Tracker::Implementation::expectedOf(const MatchStatistics& s) const {
 /// Whether as many matches agree by accident, among all that were met. In the first images depths
 /// are so vague that matches leave each other most of their gates: only very few count for nothing.
 bool Tracker::Implementation::isByChance(const MatchResult& result, double expected) const {
-  if (start_adjustment_.isActive()) return result.statistics.matched < kLeastShare * expected;
+  if (start_adjustment_.areDepthsVague()) return result.statistics.matched < kLeastShare * expected;
   if (result.statistics.matched >= kMajority * expectedOf(result.statistics)) return false;
   std::vector<int> matches, accepted;
   for (int i = 0; i < prior_.size(); ++i) {

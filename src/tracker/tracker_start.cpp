@@ -57,7 +57,7 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
 
 /// Lets the first images, taken together, correct what the filter made of them one by one.
 void Tracker::Implementation::adjustStart(TrackedFrame* frame) {
-  start_adjustment_.add(frame->index, interval_s_, filter_.camera(), fused_);
+  start_adjustment_.add(frame->index, interval_s_, filter_, fused_);
   const auto adjusted = start_adjustment_.adjust(camera_.corrected({}), filter_);
   if (!adjusted) return;
   std::vector<FeatureId> dropped;  // seen too rarely to take part
@@ -74,6 +74,7 @@ void Tracker::Implementation::adjustStart(TrackedFrame* frame) {
     return adjusted->corrected(image, T_world_camera);
   });
   filter_.restore(adjusted->camera, adjusted->features, adjusted->covariance, filter_.nextId());
+  structure_.restartAverages();
 }
 
 bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame) {

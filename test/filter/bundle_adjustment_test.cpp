@@ -82,6 +82,7 @@ TEST(BundleAdjustment, StopsWhereNoParameterCanLowerTheCost) {
 TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
   const CameraModel model(exampleCalibration());
   BundleOptions options = weakPrior();
+  options.sigma_px = 0.45;
   options.outlier_px = 1e6;
   options.sigma_calibration << 0.01, 0.01, 0.01, 0.1, 0.1;
   Bundle bundle = exampleBundle(model, 4, 12, 0.1, 0.0, 3);
@@ -138,12 +139,19 @@ TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
   information.diagonal().segment<CameraError::kCalibrationSize>(calibration) +=
       options.sigma_calibration.array().square().inverse().matrix();
   const double scale_sigma = 0.01;
-  Eigen::VectorXd scale = Eigen::VectorXd::Zero(size);
   for (int i = 0; i < features; ++i) {
     const int row = first_feature + 3 * i + 2;
     information(row, row) += 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
-    scale[row] = 1.0 / (features * bundle.features[i].inverse_depth);
   }
+  // The unit of the depths, or the factor by which the cameras' way fits itself best.
+  Eigen::VectorXd depths = Eigen::VectorXd::Zero(size), way = depths;
+  for (int i = 0; i < features; ++i)
+    depths[first_feature + 3 * i + 2] = 1.0 / (features * bundle.features[i].inverse_depth);
+  double square = 0.0;
+  for (const CameraState& camera : bundle.cameras) square += camera.position_world.squaredNorm();
+  for (std::size_t k = 1; k < bundle.cameras.size(); ++k)
+    way.segment<3>(6 * static_cast<Eigen::Index>(k - 1)) =
+        bundle.cameras[k].position_world / square;
   // The lens stays as doubtful as it was and makes the rest so: what images tell of it is left out.
   std::vector<int> order(size);
   std::iota(order.begin(), order.end(), 0);
@@ -156,13 +164,16 @@ TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
       cross * I.topLeftCorner(size - 4, size - 4).inverse() * cross.transpose();
   I.diagonal().tail<4>() += options.sigma_calibration.tail<4>().array().square().inverse().matrix();
   information = lens_last * I * lens_last.transpose();
-  information += scale * scale.transpose() / (scale_sigma * scale_sigma);
-  const Eigen::MatrixXd plain = information.inverse();
-
-  const Eigen::MatrixXd covariance = bundleCovariance(model, options, bundle, 2, scale_sigma);
-  const int kept = size - 6;
-  ASSERT_EQ(covariance.rows(), kept);
-  EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
+  for (const BundleUnit unit : {BundleUnit::kDepths, BundleUnit::kWay}) {
+    const Eigen::VectorXd& scale = unit == BundleUnit::kDepths ? depths : way;
+    const Eigen::MatrixXd plain =
+        (information + scale * scale.transpose() / (scale_sigma * scale_sigma)).inverse();
+    const Eigen::MatrixXd covariance =
+        bundleCovariance(model, options, bundle, 2, unit, scale_sigma);
+    const int kept = size - 6;
+    ASSERT_EQ(covariance.rows(), kept);
+    EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
+  }
 }
 
 TEST(BundleAdjustment, AFeatureThatNoImageShowsIsNoFault) {

@@ -115,7 +115,7 @@ class Simulation {
   }
 
   void adjustStart(double dt, const std::vector<FeatureMeasurement>& measurements) {
-    start_adjustment_.add(++frame_, dt, filter_.camera(), measurements);
+    start_adjustment_.add(++frame_, dt, filter_, measurements);
     const auto adjusted = start_adjustment_.adjust(model_, filter_);
     if (adjusted)
       filter_.restore(adjusted->camera, adjusted->features, adjusted->covariance, filter_.nextId());

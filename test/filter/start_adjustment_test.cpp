@@ -25,7 +25,7 @@ class StartOfATrack {
   /// What the images up to `image` make of it; nothing is adjusted before the last.
   std::optional<AdjustedStart> adjustAfter(int image) {
     show(image);
-    return adjustment_.adjust(model_, filter_);
+    return adjust();
   }
 
   /// All images not yet shown up to `image`.
@@ -36,7 +36,7 @@ class StartOfATrack {
         const auto it = std::find(place_of_id_.begin(), place_of_id_.end(), o.feature);
         if (it != place_of_id_.end()) seen.push_back({it - place_of_id_.begin(), o.pixel, 0.0});
       }
-      adjustment_.add(shown_ + 1, 1.0 / 30.0, filter_.camera(), seen);
+      adjustment_.add(shown_ + 1, 1.0 / 30.0, filter_, seen);
     }
   }
 
@@ -51,6 +51,20 @@ class StartOfATrack {
     filter_.rescale(factor);
     adjustment_.rescale(factor);
   }
+
+  /// Those that `image` shows first.
+  void startFeatures(int image) {
+    std::vector<FeatureMeasurement> first_sights;
+    for (const BundleObservation& o : truth_.observations[image]) {
+      if (std::find(place_of_id_.begin(), place_of_id_.end(), o.feature) != place_of_id_.end())
+        continue;
+      first_sights.push_back({filter_.addInverseDepthFeature(model_, o.pixel), o.pixel, 0.0});
+      place_of_id_.push_back(o.feature);
+    }
+    adjustment_.addFirstSights(first_sights);
+  }
+
+  std::optional<AdjustedStart> adjust() { return adjustment_.adjust(model_, filter_); }
 
   static FilterOptions options() {
     FilterOptions options;
@@ -175,7 +189,73 @@ TEST(StartAdjustment, AScaleThatIsSetMeanwhileHoldsForEarlierImagesToo) {
             0.1 * place.norm());
 }
 
-TEST(StartAdjustment, EndsWhenTheFirstImageIsOutOfSight) {
+TEST(StartAdjustment, GoesOnWhenTheFirstImageIsOutOfSight) {
+  // Features come and go; the filter forgets those that went, but what the first images say of them
+  // still counts.
+  constexpr int kPerImage = 5, kInSight = 40, kLast = 11;
+  Bundle truth = exampleBundle(CameraModel(exampleCalibration()), kLast + 1,
+                               kPerImage * kLast + kInSight, 0.003, 0.2, 6);
+  for (int k = 0; k <= kLast; ++k) {
+    auto& seen = truth.observations[k];
+    seen.erase(std::remove_if(seen.begin(), seen.end(),
+                              [k](const BundleObservation& o) {
+                                return o.feature < kPerImage * k ||
+                                       o.feature >= kPerImage * k + kInSight;
+                              }),
+               seen.end());
+  }
+  StartOfATrack start(truth);
+  for (int k = 1; k < kLast; ++k) {
+    start.show(k);
+    start.startFeatures(k);
+  }
+  std::vector<FeatureId> gone;
+  for (const FeatureState& feature : start.filter().features())
+    if (start.featureOf(feature.id) < kPerImage * kLast) gone.push_back(feature.id);
+  ASSERT_GT(gone.size(), 20u);
+  start.filter().removeFeatures(gone);
+  start.show(kLast);
+  const auto adjusted = start.adjust();
+  ASSERT_TRUE(adjusted);
+  EXPECT_TRUE(start.adjustment().isActive());
+  EXPECT_FALSE(start.adjustment().areDepthsVague());
+  EXPECT_GT(adjusted->features.size(), 10u);
+  for (const FeatureState& feature : adjusted->features)
+    EXPECT_NE(start.filter().find(feature.id), nullptr);
+  EXPECT_EQ(adjusted->moves.front().image, 0);
+  EXPECT_GT(cosineBetween(adjusted->camera.position_world, truth.cameras[kLast].position_world),
+            0.98);
+}
+
+TEST(StartAdjustment, TheUnitOfTheWayStays) {
+  const Bundle truth = track(24, 0.0005, 7);
+  StartOfATrack start(truth);
+  const auto first = start.adjustAfter(11);
+  ASSERT_TRUE(first);
+  start.filter().restore(first->camera, first->features, first->covariance, 1000);
+  for (int k = 12; k <= 23; ++k) {
+    start.filter().predict(1.0 / 30.0);
+    start.show(k);
+  }
+  const auto second = start.adjust();
+  ASSERT_TRUE(second);
+  double product = 0.0, square = 0.0;
+  for (const AdjustedStart::Move& move : second->moves) {
+    const Eigen::Vector3d was = move.T_world_camera_before.translation(),
+                          is = move.T_world_camera_after.translation();
+    product += was.dot(is);
+    square += is.squaredNorm();
+  }
+  std::vector<double> by_depths;
+  for (const FeatureState& before : first->features)
+    for (const FeatureState& after : second->features)
+      if (before.id == after.id) by_depths.push_back(after.inverse_depth / before.inverse_depth);
+  std::sort(by_depths.begin(), by_depths.end());
+  EXPECT_NEAR(product / square, 1.0, 0.02);
+  EXPECT_GT(cosineBetween(second->camera.position_world, truth.cameras[23].position_world), 0.99);
+}
+
+TEST(StartAdjustment, EndsWhenNoEarlierImageIsInSight) {
   Bundle truth = track(12, 0.02, 5);
   StartOfATrack start(truth);
   for (std::size_t k = 6; k < truth.observations.size(); ++k) truth.observations[k].resize(4);

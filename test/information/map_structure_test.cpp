@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <stdexcept>
+#include <vector>
 
 #include "information/random_gaussian.h"
 
@@ -34,6 +36,28 @@ TEST(MapStructure, SnapshotsAreTheGraphItsTreeAndItsHierarchy) {
   EXPECT_EQ(restored.snapshot().graph->ids, snapshot.graph->ids);
   structure.clear();
   EXPECT_TRUE(structure.snapshot().graph->ids.empty());
+}
+
+TEST(MapStructure, AveragesBeginAnewWithTheNextFrameAndLabelsGoOn) {
+  const Eigen::MatrixXd before = test::randomMeasurementCovariance(12, 1),
+                        after = test::randomMeasurementCovariance(12, 2);
+  std::vector<std::int64_t> ids(12);
+  std::iota(ids.begin(), ids.end(), 0);
+  MapStructure structure, only_after;
+  structure.addFrame(ids, before);
+  structure.snapshot();
+  structure.restartAverages();
+  EXPECT_EQ(structure.snapshot().graph->links.size(), 66u);  // until there is something new
+  structure.addFrame(ids, after);
+  only_after.addFrame(ids, after);
+  const MapStructure::Snapshot is = structure.snapshot(), plain = only_after.snapshot();
+  ASSERT_EQ(is.graph->links.size(), plain.graph->links.size());
+  for (std::size_t i = 0; i < is.graph->links.size(); ++i) {
+    EXPECT_EQ(is.graph->links[i].information_bits, plain.graph->links[i].information_bits);
+    EXPECT_EQ(is.graph->links[i].frames, 1);
+  }
+  structure.addFrame(ids, before);
+  EXPECT_EQ(structure.snapshot().graph->links.front().frames, 2);
 }
 
 }  // namespace

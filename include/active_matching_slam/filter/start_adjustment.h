@@ -31,8 +31,8 @@ struct AdjustedStart {
 /// and can't take back what it made of them: a turn read as a move, near and far exchanged. So the
 /// matches of the first images are kept, and when they show parallax, cameras and depths are
 /// adjusted together, from what the filter believes and from its opposites; the best, if it is
-/// clearly the best, becomes the filter's state. Repeated as the parallax grows, until depths are
-/// known well enough to be followed linearly.
+/// clearly the best, becomes the filter's state. Repeated as parallax or time grow, also when the
+/// first image is out of sight, until depths are known well enough to be followed linearly.
 class StartAdjustment {
  public:
   /// Starts anew with image `index`: `first` is where it shows the filter's features; its camera is
@@ -40,10 +40,12 @@ class StartAdjustment {
   void begin(std::int64_t index, const std::vector<FeatureMeasurement>& first);
   void end() { is_active_ = false; }
   bool isActive() const { return is_active_; }
+  /// While all that is seen has been seen from about the same place.
+  bool areDepthsVague() const { return is_active_ && !has_left_first_; }
 
-  /// Keeps the matches of image `index`, taken `interval_s` after the one before; `camera` is what
-  /// the filter made of it.
-  void add(std::int64_t index, double interval_s, const CameraState& camera,
+  /// Keeps the matches of image `index`, taken `interval_s` after the one before; `filter` is what
+  /// was made of it.
+  void add(std::int64_t index, double interval_s, const Ekf& filter,
            const std::vector<FeatureMeasurement>& measurements);
 
   /// Joins to the last image features that it showed first, numbered above all before.
@@ -67,16 +69,29 @@ class StartAdjustment {
   };
 
   void thinOut();
-  std::optional<double> parallaxToFirst(const CameraModel& model, const Image& image) const;
-  Bundle makeBundle(const CameraModel& model, const Ekf& filter, std::vector<FeatureId>* ids) const;
+  void rememberFeatures(const Ekf& filter);
+  std::optional<double> parallax(const CameraModel& model);
+  bool isTime(double parallax_px, double sigma_px);
+  Bundle makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const;
+  std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions& options,
+                                    const Bundle& believed) const;
+  void adopt(const Bundle& reading, const std::vector<FeatureId>& ids, AdjustedStart* start);
   std::optional<AdjustedStart> makeState(const CameraModel& model, const Ekf& filter,
                                          const BundleOptions& options, const Bundle& bundle,
-                                         const std::vector<FeatureId>& ids) const;
+                                         const std::vector<FeatureId>& ids, BundleUnit unit) const;
 
   bool is_active_ = false;
   std::vector<Image> images_;  ///< the first, some between, the last two
+  /// Ascending id: those of the filter, and what has left it but is in the images.
+  std::vector<FeatureState> features_;
+  bool has_left_first_ = false;  ///< the last image shares too little with the first
+  bool is_unit_known_ = false;   ///< a scale was set
+  double unit_drift_ = 1.0;      ///< of the way's unit from the depths'
   double least_motion_px_ = 1.0;
-  double next_parallax_px_ = 0.0;
+  double last_parallax_px_ = 0.0;  ///< when adjusted last; zero: has not been
+  double next_parallax_px_ = 0.0;  ///< to be adjusted at
+  double next_telling_px_ = 0.0;   ///< to be told from its opposites at
+  int age_ = 0, last_age_ = 0;     ///< of the start, now and when adjusted last [images]
 };
 
 }  // namespace active_matching_slam

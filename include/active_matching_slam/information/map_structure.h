@@ -20,6 +20,9 @@ class MapStructure {
   void addFrame(const std::vector<std::int64_t>& ids, const Eigen::Ref<const Eigen::MatrixXd>& S);
   void keepOnly(const std::vector<std::int64_t>& ids);
   void clear();
+  /// The next frame begins the averages anew, for what came before was of a map that turned out to
+  /// be another. Labels go on from those of the snapshot before.
+  void restartAverages() { is_outdated_ = true; }
 
   struct Snapshot {
     std::shared_ptr<const MutualInformationGraph> graph;
@@ -34,6 +37,7 @@ class MapStructure {
  private:
   MutualInformationAccumulator accumulator_;
   SubmapTracker tracker_;
+  bool is_outdated_ = false;  ///< what the accumulator holds
 };
 
 }  // namespace active_matching_slam
