@@ -12,6 +12,7 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.pose = {frame.stamp_s, frame.camera.poseWorldCamera()};
   record.speed = frame.camera.velocity_world.norm();
   record.pose_covariance = frame.camera_covariance.topLeftCorner<6, 6>();
+  record.match_sigma_px = frame.match_sigma_px;
   record.readout_s = frame.camera.readout_s;
   record.lens = frame.camera.lens;
   record.nis = frame.nis;

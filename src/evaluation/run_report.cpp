@@ -62,6 +62,7 @@ void addStateColumns(const FrameErrors& errors, std::vector<Column>* columns) {
       column("speed_mps", &FrameRecord::speed),
       {"position_error_m", [errors](std::size_t row, R) { return cell(errors.position_m[row]); }},
       {"pose_nees", [errors](std::size_t row, R) { return cell(errors.pose_nees[row]); }},
+      column("match_sigma_px", &FrameRecord::match_sigma_px),
       column("readout_s", &FrameRecord::readout_s),
       column("lens_focal", [](R r) { return r.lens.focal; }),
       column("lens_radial", [](R r) { return r.lens.radial; }),

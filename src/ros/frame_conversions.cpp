@@ -112,6 +112,7 @@ ams_msgs::MatchingStatistics toStatisticsMsg(const TrackedFrame& frame,
   message.information_bits_left = finiteOrZero(matching.information_bits_end);
   message.nis = finiteOrZero(frame.nis);
   message.nis_degrees = frame.nis_degrees;
+  message.match_sigma_px = frame.match_sigma_px;
   message.readout_s = frame.camera.readout_s;
   message.lens_focal = frame.camera.lens.focal;
   message.lens_radial = frame.camera.lens.radial;

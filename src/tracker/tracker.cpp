@@ -36,6 +36,7 @@ void Tracker::Implementation::reset(const std::string& reason) {
   structure_.clear();
   structure_snapshot_ = {};
   filter_.reset(CameraState(), MotionCovariance::Zero());
+  match_noise_.reset();
   scale_source_ = ScaleSource::kFree;
   previous_image_.release();
   poor_frames_ = 0;

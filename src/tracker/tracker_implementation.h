@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "active_matching_slam/filter/match_noise.h"
 #include "active_matching_slam/filter/start_adjustment.h"
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/information/map_structure.h"
@@ -60,6 +61,7 @@ class Tracker::Implementation {
   double expectedOf(const MatchStatistics& s) const;
   bool isByChance(const MatchResult& result, double expected) const;
   void match(const cv::Mat& image, TrackedFrame* frame);
+  std::vector<double> residuals() const;
   void correct(TrackedFrame* frame);
   void judge();
   void lose(const std::string& reason);
@@ -81,6 +83,7 @@ class Tracker::Implementation {
   CameraModel camera_;
   TrackerOptions options_;
   Ekf filter_;
+  MatchNoise match_noise_;
   StartAdjustment start_adjustment_;
   FeatureMap map_;
   ImageFeatureSearch search_, second_search_;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/image/image_motion.h"
 #include "active_matching_slam/image/warp.h"
 #include "active_matching_slam/information/gaussian_information.h"
@@ -227,6 +228,19 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   result.statistics.matched = 0;
 }
 
+/// What the matches fused miss of the map as it is now [px], both coordinates of each.
+std::vector<double> Tracker::Implementation::residuals() const {
+  const CameraModel lens = camera_.corrected(filter_.camera().lens);
+  std::vector<double> residuals;
+  for (const FeatureMeasurement& fused : fused_) {
+    const auto projection = projectFeature(lens, filter_.camera(), *filter_.find(fused.id));
+    if (!projection) continue;
+    residuals.push_back(fused.pixel.x() - projection->pixel.x());
+    residuals.push_back(fused.pixel.y() - projection->pixel.y());
+  }
+  return residuals;
+}
+
 /// Fuses the accepted matches.
 void Tracker::Implementation::correct(TrackedFrame* frame) {
   fused_.clear();
@@ -248,7 +262,10 @@ void Tracker::Implementation::correct(TrackedFrame* frame) {
     fused_.push_back(
         {prior_.ids[matched[k]], prior_.mean(matched[k]) + innovation.segment<2>(2 * k), 0.0});
 
+  frame->match_sigma_px = match_noise_.sigma_px(options_.filter);
+  for (FeatureMeasurement& fused : fused_) fused.sigma_px = frame->match_sigma_px;
   const UpdateReport report = filter_.update(camera_, fused_);
+  match_noise_.learn(options_.filter, residuals());
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 

@@ -60,6 +60,7 @@ class Run : public testing::Test {
     frame.camera.position_world = estimate_[i].T_world_camera.translation();
     frame.camera.q_world_camera = Eigen::Quaterniond(estimate_[i].T_world_camera.linear());
     frame.camera.readout_s = 1e-3 * i;
+    frame.match_sigma_px = 0.01 * i;
     frame.camera.lens.centre.y() = -1e-4 * i;
     frame.camera_covariance.setIdentity();
     frame.matching.statistics.matcher = "active";
@@ -188,6 +189,7 @@ TEST_F(Run, StatisticsHaveOneRowAFrameAndUnitsInTheirNames) {
   EXPECT_EQ(rows[7].at("cut_short"), "1");
   EXPECT_EQ(rows[7].at("total_ms"), "14");
   EXPECT_EQ(std::stod(rows[7].at("readout_s")), 7e-3);
+  EXPECT_EQ(std::stod(rows[7].at("match_sigma_px")), 0.07);
   EXPECT_EQ(std::stod(rows[7].at("lens_centre_y")), -7e-4);
   EXPECT_EQ(std::stod(rows[7].at("lens_focal")), 0.0);
   EXPECT_EQ(rows[7].at("pose_nees"), "");  // not simulated

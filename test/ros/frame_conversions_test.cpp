@@ -95,11 +95,13 @@ TEST(FeatureMessage, NothingThatIsNotFiniteIsPublished) {
   EXPECT_EQ(0.0, toStatisticsMsg(frame, 0, worldHeader()).nis);
 }
 
-TEST(StatisticsMessage, TellsTheCalibrationAsLearnt) {
+TEST(StatisticsMessage, TellsCalibrationAndNoiseAsLearnt) {
   TrackedFrame frame;
+  frame.match_sigma_px = 0.2;
   frame.camera.readout_s = 0.024;
   frame.camera.lens = {0.01, -0.02, {0.003, -0.004}};
   const auto message = toStatisticsMsg(frame, 0, worldHeader());
+  EXPECT_EQ(0.2, message.match_sigma_px);
   EXPECT_EQ(0.024, message.readout_s);
   EXPECT_EQ(0.01, message.lens_focal);
   EXPECT_EQ(-0.02, message.lens_radial);

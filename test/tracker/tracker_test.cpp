@@ -54,6 +54,25 @@ TEST(Tracker, FollowsASlowCameraToTheEnd) {
   EXPECT_LT(fit.rms_m, kShareOfPath * fit.path_m) << fit.path_m << " m long";
 }
 
+TEST(Tracker, LearnsHowGoodMatchesAre) {
+  const TrackerOptions options;
+  Tracker tracker = slowTracker();
+  const Frames frames = trackFrames(slowFilm(), &tracker, 0, 120);
+  EXPECT_EQ(frames[1]->match_sigma_px, options.filter.sigma_px);
+  EXPECT_LT(frames.back()->match_sigma_px, 0.8 * options.filter.sigma_px);
+  EXPECT_GE(frames.back()->match_sigma_px, options.filter.minimum_sigma_px);
+
+  tracker.reset("test");
+  EXPECT_EQ(trackFrames(slowFilm(), &tracker, 120, 122).back()->match_sigma_px,
+            options.filter.sigma_px);
+
+  TrackerOptions never = options;
+  never.filter.minimum_sigma_px = options.filter.sigma_px;
+  Tracker other = slowTracker(never);
+  for (const auto& frame : trackFrames(slowFilm(), &other, 0, 60))
+    EXPECT_EQ(frame->match_sigma_px, frame->index == 0 ? 0.0 : options.filter.sigma_px);
+}
+
 TEST(Tracker, RepeatsItselfBitForBit) {
   Tracker one = slowTracker(), two = slowTracker();
   const Frames a = trackFrames(slowFilm(), &one, 0, 60);

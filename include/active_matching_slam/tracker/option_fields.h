@@ -54,6 +54,9 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.filter.sigma_angular_acceleration_rps2, 1e-3, 1e3);
   visit(F{"filter/sigma_px", "noise of a matched image point, per axis [px]", true},
         o.filter.sigma_px, 0.05, 20.0);
+  visit(F{"filter/minimum_sigma_px",
+          "updates trust matches that show less noise, down to this; sigma_px: never [px]", true},
+        o.filter.minimum_sigma_px, 0.01, 20.0);
   visit(F{"filter/initial_sigma_velocity_mps", "at start, per axis [m/s]", true},
         o.filter.initial_sigma_velocity_mps, 1e-3, 100.0);
   visit(F{"filter/initial_sigma_angular_velocity_rps", "at start, per axis [rad/s]", true},
