@@ -1,8 +1,10 @@
 #pragma once
 
 #include <random>
+#include <utility>
 
 #include "active_matching_slam/information/mutual_information_graph.h"
+#include "active_matching_slam/information/submap_hierarchy.h"
 
 namespace active_matching_slam {
 namespace test {
@@ -22,6 +24,14 @@ inline MutualInformationGraph randomGraph(int features, unsigned seed, double de
   }
   return graph;
 }
+
+/// A graph and its hierarchy.
+struct GraphStructure {
+  explicit GraphStructure(MutualInformationGraph given)
+      : graph(std::move(given)), hierarchy(buildSubmapHierarchy(graph)) {}
+  MutualInformationGraph graph;
+  SubmapHierarchy hierarchy;
+};
 
 }  // namespace test
 }  // namespace active_matching_slam

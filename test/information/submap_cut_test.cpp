@@ -6,7 +6,6 @@
 #include <random>
 #include <set>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include "information/random_graph.h"
@@ -16,9 +15,8 @@ namespace {
 
 using test::randomGraph;
 
-struct Structure {
-  explicit Structure(MutualInformationGraph given)
-      : graph(std::move(given)), hierarchy(buildSubmapHierarchy(graph)) {}
+struct Structure : test::GraphStructure {
+  using GraphStructure::GraphStructure;
 
   SubmapPartition cut(int submaps) const { return cutIntoSubmaps(graph, hierarchy, submaps); }
 
@@ -43,9 +41,6 @@ struct Structure {
     return preservedInformation(graphEdges(graph), labels,
                                 *std::max_element(labels.begin(), labels.end()) + 1);
   }
-
-  MutualInformationGraph graph;
-  SubmapHierarchy hierarchy;
 };
 
 int smallest(const std::vector<int>& labels) {

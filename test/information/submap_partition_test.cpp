@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <utility>
 
 #include "information/random_graph.h"
 
@@ -12,13 +11,7 @@ namespace active_matching_slam {
 namespace {
 
 using test::randomGraph;
-
-struct Structure {
-  explicit Structure(MutualInformationGraph given)
-      : graph(std::move(given)), hierarchy(buildSubmapHierarchy(graph)) {}
-  MutualInformationGraph graph;
-  SubmapHierarchy hierarchy;
-};
+using Structure = test::GraphStructure;
 
 TEST(SubmapPartition, HasAsManySubmapsAsAskedForAndContainsTheLevels) {
   const Structure s(randomGraph(40, 1));
