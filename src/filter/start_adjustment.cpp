@@ -12,7 +12,8 @@ namespace {
 
 /// Parallax: adjusted first at [sigma of the noise of image points], and no more beyond.
 constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 16.0;
-constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next
+constexpr double kGrowth = 1.3;         ///< of parallax or time from one adjustment to the next
+constexpr double kTellingGrowth = 2.0;  ///< of parallax, until readings are told apart again
 /// By so much wider than that of a new feature is the prior of depths while readings are told
 /// apart: in a scene that goes from near to far it would rather bend the motion than let depths
 /// differ.
@@ -289,7 +290,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   features_.clear();
   has_left_first_ = is_unit_known_ = false;
   unit_drift_ = least_motion_px_ = 1.0;
-  last_parallax_px_ = next_parallax_px_ = 0.0;
+  last_parallax_px_ = next_parallax_px_ = next_telling_px_ = 0.0;
   age_ = last_age_ = 0;
 }
 
@@ -458,14 +459,18 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   // So few images would bend the lens until depths fit their prior: it stays as calibrated.
   options.sigma_calibration[0] = filter.options().initial_sigma_readout_s;
 
-  Bundle normalised = believed;  // a known scale may have been set
-  normalise(options.inverse_depth, &normalised);
-  auto reading = bestReading(model, options, normalised);
-  if (!reading) return std::nullopt;
-  adjustByItsNoise(model, &options, &*reading, &believed, &ids);
+  Bundle reading = believed;
+  normalise(options.inverse_depth, &reading);  // a known scale may have been set
+  if (*parallax_px >= next_telling_px_) {
+    const auto best = bestReading(model, options, reading);
+    next_telling_px_ = best ? kTellingGrowth * *parallax_px : 0.0;
+    if (!best) return std::nullopt;
+    reading = *best;
+  }
+  adjustByItsNoise(model, &options, &reading, &believed, &ids);
 
   // Others have seen the way, so that its unit stays, as far as it was known.
-  const double by_depths = depthFactor(believed, *reading), by_way = wayFactor(believed, *reading);
+  const double by_depths = depthFactor(believed, reading), by_way = wayFactor(believed, reading);
   const bool keeps_way = (last_parallax_px_ > 0.0 || is_unit_known_) && by_way > 0.0;
   double drift = unit_drift_;
   if (keeps_way) {
@@ -473,11 +478,11 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
     if (!is_unit_known_)
       drift = std::pow(drift, 1.0 / (1.0 + std::pow(options.sigma_px / last_parallax_px_, 2)));
   }
-  rescaleBundle(by_depths * drift / unit_drift_, &*reading);
-  auto start = makeState(model, filter, options, *reading, ids,
+  rescaleBundle(by_depths * drift / unit_drift_, &reading);
+  auto start = makeState(model, filter, options, reading, ids,
                          keeps_way ? BundleUnit::kWay : BundleUnit::kDepths);
   if (start) {
-    adopt(*reading, ids, &*start);
+    adopt(reading, ids, &*start);
     unit_drift_ = drift;
     last_parallax_px_ = *parallax_px;
   }
