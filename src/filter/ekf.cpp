@@ -93,12 +93,9 @@ void Ekf::rescale(double factor) {
   camera_.velocity_world *= factor;
   for (FeatureState& feature : features_) {
     scale.segment<3>(feature.offset).setConstant(factor);
-    feature.anchor_world *= factor;
-    feature.point_world *= factor;
-    if (feature.kind == FeatureKind::kInverseDepth) {
+    feature.rescale(factor);
+    if (feature.kind == FeatureKind::kInverseDepth)
       scale[feature.offset + FeatureError::kInverseDepth] = 1.0 / factor;
-      feature.inverse_depth /= factor;
-    }
   }
   auto P = covariance_.view();
   for (int j = 0; j < P.cols(); ++j) {

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
+
+#include "active_matching_slam/filter/median.h"
 
 namespace active_matching_slam {
 namespace {
@@ -23,9 +26,7 @@ void MatchNoise::learn(const FilterOptions& options, std::vector<double> residua
                      residuals_px.end());
   if (residuals_px.size() < kLeastResiduals) return;
   for (double& residual : residuals_px) residual = std::abs(residual);
-  const auto middle = residuals_px.begin() + static_cast<std::ptrdiff_t>(residuals_px.size() / 2);
-  std::nth_element(residuals_px.begin(), middle, residuals_px.end());
-  const double shown_px = kUnseen * kSigmaByMedian * *middle;
+  const double shown_px = kUnseen * kSigmaByMedian * medianOf(std::move(residuals_px));
   const double before_px2 = variance_px2_.value_or(options.sigma_px * options.sigma_px);
   variance_px2_ = before_px2 + kWeight * (shown_px * shown_px - before_px2);
 }

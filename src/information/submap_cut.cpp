@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace active_matching_slam {
@@ -89,11 +90,7 @@ class CutTree {
     DisjointSets sets(nodes_);
     for (int node = 0; node < nodes_; ++node)
       if (!isTop(node)) sets.unite(node, parent_[node]);
-    SubmapPartition partition;
-    partition.submap_of_feature = sets.labels();
-    partition.submaps = sets.count();
-    partition.preserved = preserved();
-    return partition;
+    return partitionOf(sets, edges_);
   }
 
  private:
@@ -178,18 +175,20 @@ SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
       tree.setCut(cut.node, true);
     }
   }
+  double preserved = tree.preserved();
   bool has_gained = true;
   for (int sweep = 0; sweep < kMostSweeps && has_gained; ++sweep) {
     has_gained = false;
     for (int node = 0; node < features; ++node) {
       if (!tree.hasLink(node) || !tree.isCut(node)) continue;
-      const double preserved = tree.preserved();
       tree.setCut(node, false);
       const Cut cut = tree.best(least);
       const bool gains = cut.node != kNone &&
                          tree.preserved() + cut.change_bits / total_bits > preserved + kLeastGain;
       tree.setCut(gains ? cut.node : node, true);
-      has_gained |= gains;
+      if (!gains) continue;
+      preserved = tree.preserved();
+      has_gained = true;
     }
   }
   return tree.partition();

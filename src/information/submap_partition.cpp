@@ -14,6 +14,8 @@ void checkIds(const MutualInformationGraph& graph, const SubmapHierarchy& hierar
                               " of the hierarchy");
 }
 
+}  // namespace
+
 SubmapPartition partitionOf(DisjointSets& sets, const std::vector<WeightedEdge>& edges) {
   SubmapPartition partition;
   partition.submap_of_feature = sets.labels();
@@ -21,8 +23,6 @@ SubmapPartition partitionOf(DisjointSets& sets, const std::vector<WeightedEdge>&
   partition.preserved = preservedInformation(edges, partition.submap_of_feature, partition.submaps);
   return partition;
 }
-
-}  // namespace
 
 SubmapPartition partitionIntoSubmaps(const MutualInformationGraph& graph,
                                      const SubmapHierarchy& hierarchy, int submaps) {

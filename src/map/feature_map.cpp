@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "active_matching_slam/filter/median.h"
+
 namespace active_matching_slam {
 namespace {
 
@@ -15,13 +17,6 @@ constexpr double kRateMemory = 0.9;  ///< of the recent rate, a search
 constexpr int kLeastMatchesToDrift = 10;
 constexpr std::size_t kLeastFeaturesToCompare = 8;
 constexpr double kMostDrift = 3.5, kMostDriftPx = 0.3;  ///< to the median; and at least
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Eigen::Vector2d medianInnovation(const std::vector<SearchRecord>& searches) {
   std::vector<double> x, y;

@@ -258,12 +258,12 @@ void Tracker::Implementation::correct(TrackedFrame* frame) {
     innovation.segment<2>(2 * a) = match.pixel - prior_.mean(matched[a]);
   }
   const Eigen::MatrixXd S = selectFeatures(prior_.S, matched);
-  for (int k : agreeingMeasurements(innovation, S, kAgreementChi2))
-    fused_.push_back(
-        {prior_.ids[matched[k]], prior_.mean(matched[k]) + innovation.segment<2>(2 * k), 0.0});
-
   frame->match_sigma_px = match_noise_.sigma_px(options_.filter);
-  for (FeatureMeasurement& fused : fused_) fused.sigma_px = frame->match_sigma_px;
+  for (int k : agreeingMeasurements(innovation, S, kAgreementChi2))
+    fused_.push_back({prior_.ids[matched[k]],
+                      prior_.mean(matched[k]) + innovation.segment<2>(2 * k),
+                      frame->match_sigma_px});
+
   const UpdateReport report = filter_.update(camera_, fused_);
   match_noise_.learn(options_.filter, residuals());
   frame->nis = report.nis;

@@ -246,11 +246,6 @@ TEST(StartAdjustment, TheUnitOfTheWayStays) {
     product += was.dot(is);
     square += is.squaredNorm();
   }
-  std::vector<double> by_depths;
-  for (const FeatureState& before : first->features)
-    for (const FeatureState& after : second->features)
-      if (before.id == after.id) by_depths.push_back(after.inverse_depth / before.inverse_depth);
-  std::sort(by_depths.begin(), by_depths.end());
   EXPECT_NEAR(product / square, 1.0, 0.02);
   EXPECT_GT(cosineBetween(second->camera.position_world, truth.cameras[23].position_world), 0.99);
 }

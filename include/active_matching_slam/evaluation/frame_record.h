@@ -19,8 +19,8 @@ struct FrameRecord {
   StampedPose pose;    ///< a claim only when the state is kTracking
   double speed = 0.0;  ///< [m/s]
   Eigen::Matrix<double, 6, 6> pose_covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  double match_sigma_px = 0.0;
-  double readout_s = 0.0;  ///< as learnt so far; so is the lens
+  double match_sigma_px = 0.0;  ///< as learnt so far; so are readout and lens
+  double readout_s = 0.0;
   LensCorrection lens;
   double nis = 0.0;
   int nis_degrees = 0;

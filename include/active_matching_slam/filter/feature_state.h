@@ -28,6 +28,12 @@ struct FeatureState {
     basis << tangent_world, bearing_world.cross(tangent_world);
     return basis;
   }
+  /// Takes all its lengths times `factor`.
+  void rescale(double factor) {
+    anchor_world *= factor;
+    point_world *= factor;
+    if (kind == FeatureKind::kInverseDepth) inverse_depth /= factor;
+  }
   int size() const { return kind == FeatureKind::kInverseDepth ? 6 : 3; }
   /// Position in the world (for inverse depth the mean's; far away as rho -> 0).
   Eigen::Vector3d position() const {

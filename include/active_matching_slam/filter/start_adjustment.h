@@ -73,8 +73,6 @@ class StartAdjustment {
   std::optional<double> parallax(const CameraModel& model);
   bool isTime(double parallax_px, double sigma_px);
   Bundle makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const;
-  std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions& options,
-                                    const Bundle& believed) const;
   void adopt(const Bundle& reading, const std::vector<FeatureId>& ids, AdjustedStart* start);
   std::optional<AdjustedStart> makeState(const CameraModel& model, const Ekf& filter,
                                          const BundleOptions& options, const Bundle& bundle,

@@ -19,6 +19,9 @@ struct SubmapPartition {
   double preserved = 1.0;  ///< preservedInformation() of it
 };
 
+/// The partition whose submaps are the sets, in the graph of these edges.
+SubmapPartition partitionOf(DisjointSets& sets, const std::vector<WeightedEdge>& edges);
+
 /// `graph` must be the one that the hierarchy was built of. These throw std::invalid_argument when
 /// it has other ids, and naming a request out of its range.
 

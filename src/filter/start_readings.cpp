@@ -1,0 +1,111 @@
+#include "start_readings.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace active_matching_slam {
+namespace {
+
+/// By so much wider than that of a new feature is the prior of depths while readings are told
+/// apart: in a scene that goes from near to far it would rather bend the motion than let depths
+/// differ.
+constexpr double kDepthFreedom = 10.0;
+constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
+constexpr double kLeastCostGap = 12.0;     ///< to the next reading; odds of e^6
+constexpr double kMostCostPerPoint = 4.0;  ///< of 2 expected: beyond, things move or matches lie
+/// Of the assumed variance: images are credited with no less.
+constexpr double kLeastNoiseShare = 0.05;
+constexpr double kSameDirection = 0.8;  ///< cosine between two readings' moves that are one
+
+bool isSameReading(const Bundle& a, const Bundle& b) {
+  const Eigen::Vector3d& x = a.cameras.back().position_world;
+  const Eigen::Vector3d& y = b.cameras.back().position_world;
+  return x.dot(y) > kSameDirection * x.norm() * y.norm();
+}
+
+/// Every how many images one is taken, counted from the last, so that few remain.
+std::size_t stride(const Bundle& bundle) {
+  return (bundle.cameras.size() + kFewImages - 1) / kFewImages;
+}
+
+/// The first image, the last, and some between.
+Bundle someImages(const Bundle& bundle) {
+  Bundle some;
+  some.features = bundle.features;
+  some.calibration = bundle.calibration;
+  const std::size_t last = bundle.cameras.size() - 1;
+  for (std::size_t k = 0; k <= last; ++k) {
+    if (k != 0 && (last - k) % stride(bundle) != 0) continue;
+    some.cameras.push_back(bundle.cameras[k]);
+    some.observations.push_back(bundle.observations[k]);
+  }
+  return some;
+}
+
+/// All images of `bundle`: features as in `some`, its cameras where it has them, and the others
+/// moved as the next one that it has.
+Bundle allImages(const Bundle& some, const Bundle& bundle) {
+  Bundle all = bundle;
+  all.features = some.features;
+  all.calibration = some.calibration;
+  const std::size_t last = bundle.cameras.size() - 1;
+  std::size_t next = 1;
+  for (std::size_t k = 1; k <= last; ++k) {
+    const std::size_t there = k + (last - k) % stride(bundle);  // the next that `some` has
+    const Eigen::Isometry3d correction =
+        some.cameras[next].poseWorldCamera() * bundle.cameras[there].poseWorldCamera().inverse();
+    const Eigen::Isometry3d T_world_camera = correction * bundle.cameras[k].poseWorldCamera();
+    all.cameras[k].position_world = T_world_camera.translation();
+    all.cameras[k].q_world_camera = Eigen::Quaterniond(T_world_camera.linear()).normalized();
+    if (k == there) ++next;
+  }
+  return all;
+}
+
+/// All at one depth, and cameras that only turned.
+void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle) {
+  for (FeatureState& feature : bundle->features) feature.inverse_depth = inverse_depth;
+  for (std::size_t k = 1; k < bundle->cameras.size(); ++k) {
+    bundle->cameras[k].position_world.setZero();
+    alignRotation(model, static_cast<int>(k), bundle);
+  }
+}
+
+}  // namespace
+
+std::size_t countPoints(const Bundle& bundle) {
+  std::size_t points = 0;
+  for (const auto& observations : bundle.observations) points += observations.size();
+  return points;
+}
+
+std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions& options,
+                                  const Bundle& believed) {
+  std::vector<Bundle> readings(2, someImages(believed));
+  flatten(model, options.inverse_depth, &readings[1]);
+  std::vector<double> costs;
+  BundleOptions telling = options;
+  telling.sigma_inverse_depth *= kDepthFreedom;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (i >= 2) {
+      if (i == 3 && isSameReading(readings[0], readings[1])) break;
+      readings.push_back(readings[i - 2]);
+      reverseDepths(model, &readings.back());
+    }
+    costs.push_back(adjustBundle(model, telling, &readings[i]));
+    telling.hopeless_cost = std::min(telling.hopeless_cost, costs.back() + kLeastCostGap);
+  }
+  const auto best =
+      static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  // Images are often better than assumed.
+  const auto points = static_cast<double>(countPoints(readings[best]));
+  const double noise = std::clamp(costs[best] / (2.0 * points), kLeastNoiseShare, 1.0);
+  if (costs[best] > kMostCostPerPoint * points) return std::nullopt;
+  for (std::size_t i = 0; i < costs.size(); ++i)
+    if (costs[i] < costs[best] + kLeastCostGap * noise &&
+        !isSameReading(readings[i], readings[best]))
+      return std::nullopt;
+  return allImages(readings[best], believed);
+}
+
+}  // namespace active_matching_slam

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "active_matching_slam/filter/bundle_adjustment.h"
+
+namespace active_matching_slam {
+
+/// The reading of the images that is clearly the best, by some of them: `believed`, a camera that
+/// only turned, or one of these with near and far exchanged. Empty when in doubt.
+std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions& options,
+                                  const Bundle& believed);
+
+/// Image points in all images.
+std::size_t countPoints(const Bundle& bundle);
+
+}  // namespace active_matching_slam
