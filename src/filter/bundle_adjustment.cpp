@@ -58,12 +58,18 @@ CalibrationVector calibrationInformation(const BundleOptions& options) {
   return options.sigma_calibration.cwiseMax(kLeastSigmaCalibration).array().square().inverse();
 }
 
+/// Of the inverse depths by their prior.
+double depthCost(const BundleOptions& options, const Bundle& bundle) {
+  double squares = 0.0;
+  for (const FeatureState& feature : bundle.features)
+    squares += std::pow(feature.inverse_depth - options.inverse_depth, 2);
+  return squares / (options.sigma_inverse_depth * options.sigma_inverse_depth);
+}
+
 double bundleCost(const CameraModel& model, const BundleOptions& options, const Bundle& bundle) {
   double cost =
+      depthCost(options, bundle) +
       bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
-  for (const FeatureState& feature : bundle.features)
-    cost +=
-        std::pow((feature.inverse_depth - options.inverse_depth) / options.sigma_inverse_depth, 2);
   for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
     const CameraState& camera = bundle.cameras[k];
     const Eigen::Matrix3d R_camera_world = camera.q_world_camera.toRotationMatrix().transpose();
@@ -93,13 +99,12 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
   const CalibrationVector pull = information.cwiseProduct(bundle.calibration);
   N.cameras.diagonal().tail<kCalibrationSize>() = information;
   N.camera_gradient.tail<kCalibrationSize>() = -pull;
-  N.cost += bundle.calibration.dot(pull);
+  N.cost += depthCost(options, bundle) + bundle.calibration.dot(pull);
   for (int i = 0; i < F; ++i) {
     const double weight = 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
     const double error = options.inverse_depth - bundle.features[i].inverse_depth;
     N.features[i](2, 2) += weight;
     N.feature_gradient[3 * i + 2] += weight * error;
-    N.cost += weight * error * error;
   }
   for (int k = 0; k <= K; ++k) {
     const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
@@ -225,8 +230,25 @@ Eigen::VectorXd wayFunctional(const Bundle& bundle, int size) {
 
 }  // namespace
 
+void rescaleBundle(double factor, Bundle* bundle) {
+  for (FeatureState& feature : bundle->features) feature.inverse_depth /= factor;
+  for (CameraState& camera : bundle->cameras) camera.position_world *= factor;
+}
+
+double chooseUnit(const BundleOptions& options, Bundle* bundle) {
+  double sum = 0.0, squares = 0.0;
+  for (const FeatureState& feature : bundle->features) {
+    sum += feature.inverse_depth;
+    squares += feature.inverse_depth * feature.inverse_depth;
+  }
+  const double before = depthCost(options, *bundle);
+  if (sum > 0.0) rescaleBundle(squares / (options.inverse_depth * sum), bundle);
+  return before - depthCost(options, *bundle);
+}
+
 double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle) {
   double damping = 1e-3;
+  chooseUnit(options, bundle);
   NormalEquations N = linearise(model, options, *bundle);
   double cost = N.cost;
   Eigen::VectorXd camera_step, feature_steps;
@@ -243,6 +265,7 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
     }
     if (!(gain > 0.0)) break;
     *bundle = std::move(trial);
+    gain += chooseUnit(options, bundle);
     cost -= gain;
     const int left = options.max_iterations - 1 - iteration;
     if (left == 0 || gain < kLeastGain * cost || cost - left * gain > options.hopeless_cost) break;

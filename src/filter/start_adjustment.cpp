@@ -14,8 +14,7 @@ namespace {
 
 /// Parallax: adjusted first at [sigma of the noise of image points], and no more beyond.
 constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 16.0;
-constexpr double kGrowth = 1.3;         ///< of parallax or time from one adjustment to the next
-constexpr double kTellingGrowth = 2.0;  ///< of parallax, until readings are told apart again
+constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next
 /// Prior of depths in the end, by how far apart they turned out to be (median).
 constexpr double kDepthSpread = 2.0;
 constexpr std::size_t kMostImages = 24;  ///< kept
@@ -62,18 +61,6 @@ FeatureState seenFromOrigin(const FeatureState& feature) {
       std::abs(m.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
   seen.tangent_world = (axis - m * m.dot(axis)).normalized();
   return seen;
-}
-
-void rescaleBundle(double factor, Bundle* bundle) {
-  for (FeatureState& feature : bundle->features) feature.inverse_depth /= factor;
-  for (CameraState& camera : bundle->cameras) camera.position_world *= factor;
-}
-
-/// Scales the bundle to a median inverse depth.
-void normalise(double inverse_depth, Bundle* bundle) {
-  std::vector<double> values;
-  for (const FeatureState& feature : bundle->features) values.push_back(feature.inverse_depth);
-  if (!values.empty()) rescaleBundle(medianOf(std::move(values)) / inverse_depth, bundle);
 }
 
 /// Median distance of the inverse depths to one.
@@ -215,7 +202,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   features_.clear();
   has_left_first_ = is_unit_known_ = false;
   unit_drift_ = least_motion_px_ = 1.0;
-  last_parallax_px_ = next_parallax_px_ = next_telling_px_ = 0.0;
+  last_parallax_px_ = next_parallax_px_ = 0.0;
   age_ = last_age_ = 0;
 }
 
@@ -348,18 +335,14 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   // So few images would bend the lens until depths fit their prior: it stays as calibrated.
   options.sigma_calibration[0] = filter.options().initial_sigma_readout_s;
 
-  Bundle reading = believed;
-  normalise(options.inverse_depth, &reading);  // a known scale may have been set
-  if (*parallax_px >= next_telling_px_) {
-    const auto best = bestReading(model, options, reading);
-    next_telling_px_ = best ? kTellingGrowth * *parallax_px : 0.0;
-    if (!best) return std::nullopt;
-    reading = *best;
-  }
-  adjustByItsNoise(model, &options, &reading, &believed, &ids);
+  Bundle in_prior_unit = believed;  // a known scale may have been set
+  chooseUnit(options, &in_prior_unit);
+  auto reading = bestReading(model, options, in_prior_unit);
+  if (!reading) return std::nullopt;
+  adjustByItsNoise(model, &options, &*reading, &believed, &ids);
 
   // Others have seen the way, so that its unit stays, as far as it was known.
-  const double by_depths = depthFactor(believed, reading), by_way = wayFactor(believed, reading);
+  const double by_depths = depthFactor(believed, *reading), by_way = wayFactor(believed, *reading);
   const bool keeps_way = (last_parallax_px_ > 0.0 || is_unit_known_) && by_way > 0.0;
   double drift = unit_drift_;
   if (keeps_way) {
@@ -367,11 +350,11 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
     if (!is_unit_known_)
       drift = std::pow(drift, 1.0 / (1.0 + std::pow(options.sigma_px / last_parallax_px_, 2)));
   }
-  rescaleBundle(by_depths * drift / unit_drift_, &reading);
-  auto start = makeState(model, filter, options, reading, ids,
+  rescaleBundle(by_depths * drift / unit_drift_, &*reading);
+  auto start = makeState(model, filter, options, *reading, ids,
                          keeps_way ? BundleUnit::kWay : BundleUnit::kDepths);
   if (start) {
-    adopt(reading, ids, &*start);
+    adopt(*reading, ids, &*start);
     unit_drift_ = drift;
     last_parallax_px_ = *parallax_px;
   }

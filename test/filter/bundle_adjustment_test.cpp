@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "filter/example_bundle.h"
@@ -174,6 +175,40 @@ TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
     ASSERT_EQ(covariance.rows(), kept);
     EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
   }
+}
+
+TEST(BundleAdjustment, NoOtherUnitFitsThePriorOfDepthsBetter) {
+  const CameraModel model(exampleCalibration());
+  const BundleOptions options = weakPrior();
+  Bundle bundle = exampleBundle(model, 4, 20, 0.05, 0.5, 4);
+  const double error = featureErrors(model, bundle)[0];
+  rescaleBundle(7.0, &bundle);
+  const auto priorCost = [&options](const Bundle& b) {
+    double cost = 0.0;
+    for (const FeatureState& f : b.features)
+      cost += std::pow((f.inverse_depth - options.inverse_depth) / options.sigma_inverse_depth, 2);
+    return cost;
+  };
+  const double before = priorCost(bundle);
+  const double fall = chooseUnit(options, &bundle);
+  EXPECT_GT(fall, 0.0);
+  EXPECT_NEAR(priorCost(bundle), before - fall, 1e-9 * before);
+  EXPECT_NEAR(featureErrors(model, bundle)[0], error, 1e-9);
+  for (const double factor : {0.99, 1.01}) {
+    Bundle other = bundle;
+    rescaleBundle(factor, &other);
+    EXPECT_GT(priorCost(other), priorCost(bundle)) << factor;
+  }
+}
+
+TEST(BundleAdjustment, ComesToTheSameFromAnyUnit) {
+  const CameraModel model(exampleCalibration());
+  Bundle bundle = exampleBundle(model, 8, 30, 0.05, 0.5, 9), other = bundle;
+  rescaleBundle(1e4, &other);
+  EXPECT_NEAR(adjustBundle(model, weakPrior(), &bundle), adjustBundle(model, weakPrior(), &other),
+              1e-6);
+  for (std::size_t i = 0; i < bundle.features.size(); ++i)
+    EXPECT_NEAR(bundle.features[i].inverse_depth, other.features[i].inverse_depth, 1e-6) << i;
 }
 
 TEST(BundleAdjustment, AFeatureThatNoImageShowsIsNoFault) {

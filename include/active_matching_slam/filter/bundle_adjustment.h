@@ -40,10 +40,17 @@ struct BundleOptions {
   double hopeless_cost = std::numeric_limits<double>::infinity();
 };
 
+/// Takes all lengths times `factor`.
+void rescaleBundle(double factor, Bundle* bundle);
+
+/// Takes the unit of length that fits the prior of inverse depths best: images look the same in
+/// any. Returns by how much the cost falls.
+double chooseUnit(const BundleOptions& options, Bundle* bundle);
+
 /// Levenberg-Marquardt over all cameras but the first, the calibration, all bearings and inverse
 /// depths, the features eliminated first (Triggs et al. 1999, section 6.1), image points weighted
-/// by Cauchy's function. Returns the cost reached: minus twice the logarithm of the posterior, up
-/// to a constant.
+/// by Cauchy's function, the unit chosen anew after each step, since steps creep along it. Returns
+/// the cost reached: minus twice the logarithm of the posterior, up to a constant.
 double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle);
 
 /// What tells the unit of length of a bundle whose scale is free.

@@ -88,7 +88,6 @@ class StartAdjustment {
   double least_motion_px_ = 1.0;
   double last_parallax_px_ = 0.0;  ///< when adjusted last; zero: has not been
   double next_parallax_px_ = 0.0;  ///< to be adjusted at
-  double next_telling_px_ = 0.0;   ///< to be told from its opposites at
   int age_ = 0, last_age_ = 0;     ///< of the start, now and when adjusted last [images]
 };
 
