@@ -17,10 +17,14 @@ constexpr double kLeastGain = 1e-4;       ///< relative fall of the cost that is
 /// Of every bearing [1/rad^2]: one that no image shows stays as it is.
 constexpr double kLeastInformation = 1e-2;
 
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 constexpr int kCalibrationSize = CameraError::kCalibrationSize;
+using CalibrationMatrix = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
+using CalibrationByPose = Eigen::Matrix<double, kCalibrationSize, 6>;
 constexpr int kLensSize = kCalibrationSize - 1;  ///< all but the readout
 using LensVector = Eigen::Matrix<double, kLensSize, 1>;
 constexpr double kLeastSigmaCalibration = 1e-8;  ///< of what is beyond doubt
@@ -106,8 +110,12 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
     N.features[i](2, 2) += weight;
     N.feature_gradient[3 * i + 2] += weight * error;
   }
+  CalibrationMatrix calibration = CalibrationMatrix::Zero();
   for (int k = 0; k <= K; ++k) {
     const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
+    Matrix6 pose = Matrix6::Zero();
+    CalibrationByPose calibration_pose = CalibrationByPose::Zero();
+    Vector6 pose_gradient = Vector6::Zero();
     for (const BundleObservation& o : bundle.observations[k]) {
       Matrix26 d_pose;
       const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
@@ -119,22 +127,28 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
       const Eigen::Vector2d residual = plainPixel(bundle, o) - projection->pixel;
       const double weight = robustInformation(options, residual.squaredNorm());
       N.cost += robustCost(options, residual.squaredNorm());
-      const Matrix23 J = projection->d_feature.rightCols<3>();
-      N.features[o.feature] += weight * J.transpose() * J;
-      N.feature_gradient.segment<3>(3 * o.feature) += weight * J.transpose() * residual;
+      const Matrix23 J = projection->d_feature.rightCols<3>(), weighted_J = weight * J;
+      N.features[o.feature].noalias() += J.transpose() * weighted_J;
+      N.feature_gradient.segment<3>(3 * o.feature) += weighted_J.transpose() * residual;
       const auto& D = o.d_calibration;
-      N.cameras.bottomRightCorner<kCalibrationSize, kCalibrationSize>() +=
-          weight * D.transpose() * D;
-      N.camera_gradient.tail<kCalibrationSize>() += weight * D.transpose() * residual;
-      N.cross.block<kCalibrationSize, 3>(6 * K, 3 * o.feature) += weight * D.transpose() * J;
+      const Eigen::Matrix<double, 2, kCalibrationSize> weighted_D = weight * D;
+      calibration.noalias() += D.transpose() * weighted_D;
+      N.camera_gradient.tail<kCalibrationSize>() += weighted_D.transpose() * residual;
+      N.cross.block<kCalibrationSize, 3>(6 * K, 3 * o.feature) += D.transpose() * weighted_J;
       if (k == 0) continue;
-      const int row = 6 * (k - 1);
-      N.cameras.block<6, 6>(row, row) += weight * d_pose.transpose() * d_pose;
-      N.cameras.block<kCalibrationSize, 6>(6 * K, row) += weight * D.transpose() * d_pose;
-      N.camera_gradient.segment<6>(row) += weight * d_pose.transpose() * residual;
-      N.cross.block<6, 3>(row, 3 * o.feature) = weight * d_pose.transpose() * J;
+      const Matrix26 weighted_pose = weight * d_pose;
+      pose.noalias() += d_pose.transpose() * weighted_pose;
+      calibration_pose.noalias() += D.transpose() * weighted_pose;
+      pose_gradient += weighted_pose.transpose() * residual;
+      N.cross.block<6, 3>(6 * (k - 1), 3 * o.feature) = d_pose.transpose() * weighted_J;
     }
+    if (k == 0) continue;
+    const int row = 6 * (k - 1);
+    N.cameras.block<6, 6>(row, row) = pose;
+    N.cameras.block<kCalibrationSize, 6>(6 * K, row) = calibration_pose;
+    N.camera_gradient.segment<6>(row) = pose_gradient;
   }
+  N.cameras.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += calibration;
   return N;
 }
 
