@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "active_matching_slam/filter/median.h"
+#include "active_matching_slam/filter/quantile.h"
 
 namespace active_matching_slam {
 namespace {

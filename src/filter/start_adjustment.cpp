@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "active_matching_slam/filter/measurement_model.h"
-#include "active_matching_slam/filter/median.h"
+#include "active_matching_slam/filter/quantile.h"
 #include "active_matching_slam/filter/rotation.h"
 #include "start_readings.h"
 
@@ -15,9 +15,12 @@ namespace {
 /// Parallax: adjusted first at [sigma of the noise of image points], and no more beyond.
 constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 16.0;
 constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next
+/// Share of the points: where most are as far as each other, the few that are near tell the motion.
+constexpr double kAllButNear = 0.75;
 /// Prior of depths in the end, by how far apart they turned out to be (median).
 constexpr double kDepthSpread = 2.0;
-constexpr std::size_t kMostImages = 24;  ///< kept
+constexpr std::size_t kMostImages = 24;     ///< kept
+constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
@@ -31,14 +34,14 @@ const FeatureMeasurement* find(const std::vector<FeatureMeasurement>& measuremen
   return it != measurements.end() && it->id == id ? &*it : nullptr;
 }
 
-/// Median length [px] of the way of the points seen in both.
-double medianMotion(const std::vector<FeatureMeasurement>& a,
-                    const std::vector<FeatureMeasurement>& b) {
+/// Length [px] of the way of the points seen in both, all but the longest.
+double motionBetween(const std::vector<FeatureMeasurement>& a,
+                     const std::vector<FeatureMeasurement>& b) {
   std::vector<double> lengths;
   for (const FeatureMeasurement& m : a)
     if (const FeatureMeasurement* same = find(b, m.id))
       lengths.push_back((m.pixel - same->pixel).norm());
-  return medianOf(std::move(lengths));
+  return quantileOf(std::move(lengths), kAllButNear);
 }
 
 std::vector<Eigen::Vector2d> zeros(std::size_t count) {
@@ -111,7 +114,8 @@ bool isConnected(const Bundle& bundle) {
   return true;
 }
 
-/// Median angle [px] between two images that no turn explains. Empty when they share too little.
+/// Angle [px] between two images that no turn explains, of all points but those with the largest;
+/// of noise alone it would be about the median. Empty when they share too little.
 std::optional<double> parallaxBetween(const CameraModel& model,
                                       const std::vector<FeatureMeasurement>& from,
                                       const std::vector<FeatureMeasurement>& to) {
@@ -134,7 +138,8 @@ std::optional<double> parallaxBetween(const CameraModel& model,
   for (const BundleObservation& o : pair.observations[1])
     if (const auto ray = model.unproject(o.pixel))
       angles.push_back((R * ray->normalized() - pair.features[o.feature].bearing_world).norm());
-  return medianOf(std::move(angles)) * model.calibration().fx;
+  const double of_noise = std::sqrt(std::log(1.0 - kAllButNear) / std::log(0.5));  // Rayleigh's
+  return quantileOf(std::move(angles), kAllButNear) / of_noise * model.calibration().fx;
 }
 
 /// Takes out features that are no points of the scene: their image points are outliers on the
@@ -254,9 +259,9 @@ void StartAdjustment::rememberFeatures(const Ekf& filter) {
 /// many.
 void StartAdjustment::thinOut() {
   const std::size_t n = images_.size();
-  if (n >= 4 &&
-      (images_[n - 3].measurements.size() < kLeastPoints ||
-       medianMotion(images_[n - 3].measurements, images_[n - 4].measurements) < least_motion_px_)) {
+  if (n >= 4 && (images_[n - 3].measurements.size() < kLeastPoints ||
+                 motionBetween(images_[n - 3].measurements, images_[n - 4].measurements) <
+                     least_motion_px_)) {
     images_.erase(images_.end() - 3);
   }
   if (images_.size() <= kMostImages) return;
@@ -267,16 +272,18 @@ void StartAdjustment::thinOut() {
   images_ = std::move(kept);
 }
 
-/// Median angle [px] that no turn explains, of the last image to the first that shares enough with
-/// it. Empty when none does.
+/// The most of the last image to some of those before that share enough with it: what is near may
+/// have come later than the first. Empty when none does.
 std::optional<double> StartAdjustment::parallax(const CameraModel& model) {
-  for (std::size_t i = 0; i + 2 < images_.size(); ++i) {
+  std::optional<double> most_px;
+  const std::size_t step = images_.size() / kParallaxImages + 1;
+  for (std::size_t i = 0; i + 2 < images_.size(); i += step) {
     const auto parallax_px =
         parallaxBetween(model, images_[i].measurements, images_.back().measurements);
-    if (parallax_px) return parallax_px;
-    has_left_first_ = true;
+    if (parallax_px) most_px = std::max(most_px.value_or(0.0), *parallax_px);
+    has_left_first_ |= i == 0 && !parallax_px;
   }
-  return std::nullopt;
+  return most_px;
 }
 
 /// Whether parallax is more than noise, and it or time have grown enough since last asked with so

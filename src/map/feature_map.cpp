@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "active_matching_slam/filter/median.h"
+#include "active_matching_slam/filter/quantile.h"
 
 namespace active_matching_slam {
 namespace {

@@ -67,7 +67,7 @@ TEST_P(SimulatedRepetition, ActiveSearchAndRansacAloneLoseIt) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Hertz, SimulatedRepetition, testing::Values(15.0, 7.5));
+INSTANTIATE_TEST_SUITE_P(Hertz, SimulatedRepetition, testing::Values(12.0, 7.5));
 
 }  // namespace
 }  // namespace active_matching_slam

@@ -6,9 +6,10 @@
 namespace active_matching_slam {
 
 /// A camera that goes right and a little forward, turning left, past points at inverse depths from
-/// 0.4 to 1.6: the true bundle, with what `sigma_px` of noise leaves of its image points.
+/// 0.4 to 1.6, but for `share_far` of them, at 0.01: the true bundle, with what `sigma_px` of noise
+/// leaves of its image points.
 inline Bundle exampleBundle(const CameraModel& model, int cameras, int features, double step_m,
-                            double sigma_px, unsigned seed) {
+                            double sigma_px, unsigned seed, double share_far = 0.0) {
   Random random(seed);
   Bundle bundle;
   for (int k = 0; k < cameras; ++k) {
@@ -24,6 +25,7 @@ inline Bundle exampleBundle(const CameraModel& model, int cameras, int features,
     feature.bearing_world = model.unproject(random.pixel())->normalized();
     feature.tangent_world = feature.bearing_world.cross(Eigen::Vector3d::UnitY()).normalized();
     feature.inverse_depth = random.uniform(0.4, 1.6);
+    if (i < share_far * features) feature.inverse_depth = 0.01;
     for (int k = 0; k < cameras; ++k) {
       const auto projection = projectFeature(model, bundle.cameras[k], feature);
       if (!projection || !model.isInImage(projection->pixel)) continue;

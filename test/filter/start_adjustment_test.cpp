@@ -127,6 +127,27 @@ TEST(StartAdjustment, FindsTheMoveThatTheFilterMissed) {
   EXPECT_LT(sum / static_cast<double>(adjusted->features.size()), 2.5);
 }
 
+TEST(StartAdjustment, WhatIsNearTellsTheMoveAlsoWhenItCameAfterTheFirstImage) {
+  constexpr int kFar = 39;
+  Bundle truth = exampleBundle(CameraModel(exampleCalibration()), 12, 60, 0.005, 0.05, 9, 0.65);
+  for (int k = 0; k < 2; ++k) {
+    auto& seen = truth.observations[k];
+    seen.erase(std::remove_if(seen.begin(), seen.end(),
+                              [](const BundleObservation& o) { return o.feature >= kFar; }),
+               seen.end());
+  }
+  StartOfATrack start(truth);
+  start.show(2);
+  start.startFeatures(2);
+  const auto adjusted = start.adjustAfter(11);
+  ASSERT_TRUE(adjusted);
+  const AdjustedStart::Move& some = adjusted->moves[adjusted->moves.size() / 2];
+  EXPECT_GT(cosineBetween(adjusted->camera.position_world - some.T_world_camera_after.translation(),
+                          truth.cameras[11].position_world -
+                              truth.cameras[static_cast<std::size_t>(some.image)].position_world),
+            0.99);
+}
+
 TEST(StartAdjustment, SaysWhereTheCamerasOfTheStartWere) {
   const Bundle truth = track(12, 0.02, 2);
   StartOfATrack start(truth);
