@@ -19,12 +19,14 @@ constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to
 constexpr double kAllButNear = 0.75;
 /// Prior of depths in the end, by how far apart they turned out to be (median).
 constexpr double kDepthSpread = 2.0;
-constexpr std::size_t kMostImages = 24;     ///< kept
+constexpr std::size_t kMostImages = 40;     ///< kept
 constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
 constexpr double kScaleSigma = 1e-3;  ///< of the free unit, relative
+/// The start ends when the filter knows depths by so much better, at so much parallax or more.
+constexpr double kClearlyBetter = 0.7, kParallaxToTrustPx = 5.0;
 constexpr double kMostMisread = 0.1;  ///< of a way's square that a change of unit leaves
 
 const FeatureMeasurement* find(const std::vector<FeatureMeasurement>& measurements, FeatureId id) {
@@ -140,6 +142,28 @@ std::optional<double> parallaxBetween(const CameraModel& model,
       angles.push_back((R * ray->normalized() - pair.features[o.feature].bearing_world).norm());
   const double of_noise = std::sqrt(std::log(1.0 - kAllButNear) / std::log(0.5));  // Rayleigh's
   return quantileOf(std::move(angles), kAllButNear) / of_noise * model.calibration().fx;
+}
+
+/// Relative standard deviation of the distance from the world's origin, median.
+double depthSigma(const Ekf& filter, const std::vector<FeatureState>& features) {
+  std::vector<double> sigmas;
+  for (const FeatureState& feature : features) {
+    const FeatureState& known = *filter.find(feature.id);
+    const Eigen::Vector3d position = known.position();
+    const double variance = position.dot(filter.positionCovariance(known) * position);
+    sigmas.push_back(std::sqrt(std::max(variance, 0.0)) / position.squaredNorm());
+  }
+  return medianOf(std::move(sigmas));
+}
+
+/// The same of an adjusted start, all of whose features are anchored there.
+double depthSigma(const AdjustedStart& start) {
+  std::vector<double> sigmas;
+  for (const FeatureState& feature : start.features) {
+    const int row = feature.offset + FeatureError::kInverseDepth;
+    sigmas.push_back(std::sqrt(std::max(start.covariance(row, row), 0.0)) / feature.inverse_depth);
+  }
+  return medianOf(std::move(sigmas));
 }
 
 /// Takes out features that are no points of the scene: their image points are outliers on the
@@ -360,6 +384,11 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   rescaleBundle(by_depths * drift / unit_drift_, &*reading);
   auto start = makeState(model, filter, options, *reading, ids,
                          keeps_way ? BundleUnit::kWay : BundleUnit::kDepths);
+  if (start && *parallax_px >= kParallaxToTrustPx &&
+      depthSigma(filter, start->features) < kClearlyBetter * depthSigma(*start)) {
+    end();
+    return std::nullopt;
+  }
   if (start) {
     adopt(*reading, ids, &*start);
     unit_drift_ = drift;

@@ -10,52 +10,22 @@
 namespace active_matching_slam {
 namespace {
 
-/// Rows are padded to this many numbers, so that loops along them vectorise.
-constexpr int kStride = 40;
-constexpr int kLargestSide = Template::kMaximumSize + 2;
-static_assert(kStride >= kLargestSide, "a row holds the template and a rim");
+constexpr int kStride = SampledWindow::kStride;
 
 int roundedUp(int count) { return (count + 7) / 8 * 8; }
-
-/// Interpolated side x side window of the image whose first sample lies at (u, v); false when its
-/// support leaves the image. The fractional shift is the same everywhere, so it is separable.
-bool sampleWindow(const cv::Mat& image, double u, double v, int side, float* window) {
-  const int first_u = static_cast<int>(std::floor(u)), first_v = static_cast<int>(std::floor(v));
-  if (first_u < 1 || first_v < 1 || first_u + side + 1 >= image.cols ||
-      first_v + side + 1 >= image.rows)
-    return false;
-  float a[4], b[4];
-  cubicWeights(u - first_u, a);
-  cubicWeights(v - first_v, b);
-  std::array<float, (kLargestSide + 3) * kStride> along;
-  for (int j = 0; j < side + 3; ++j) {
-    const std::uint8_t* grey = image.ptr<std::uint8_t>(first_v - 1 + j) + first_u - 1;
-    float* to = &along[j * kStride];
-    for (int i = 0; i < side; ++i)
-      to[i] = a[0] * grey[i] + a[1] * grey[i + 1] + a[2] * grey[i + 2] + a[3] * grey[i + 3];
-  }
-  for (int j = 0; j < side; ++j) {
-    const float *r0 = &along[j * kStride], *r1 = r0 + kStride, *r2 = r1 + kStride;
-    const float* r3 = r2 + kStride;
-    float* to = &window[j * kStride];
-    for (int i = 0; i < side; ++i)
-      to[i] = b[0] * r0[i] + b[1] * r1[i] + b[2] * r2[i] + b[3] * r3[i];
-  }
-  return true;
-}
 
 constexpr int kSums = 13;
 
 /// The sums that make the normal equations, over the template: of grey level I, slopes I_u and I_v,
 /// 1 and t, products as named in NormalEquations. They run along columns first: a fixed order, and
 /// many at a time. Columns beyond the template run along and are left out at the end.
-__attribute__((target_clones("avx2", "default"))) void sumProducts(const float* window,
+__attribute__((target_clones("avx2", "default"))) void sumProducts(const SampledWindow& window,
                                                                    const float* wanted, int size,
                                                                    float mean, double* s) {
   const int lanes = roundedUp(size);
   float sums[kSums][kStride] = {};
   for (int j = 0; j < size; ++j) {
-    const float* at = window + (j + 1) * kStride + 1;
+    const float* at = window.row(j);
     const float* t = wanted + j * kStride;
     for (int i = 0; i < lanes; ++i) {
       const float grey = at[i] - mean;
@@ -86,7 +56,7 @@ __attribute__((target_clones("avx2", "default"))) void sumProducts(const float* 
 /// less `mean`.
 class NormalEquations {
  public:
-  NormalEquations(const float* window, const float* wanted, int size, float mean) {
+  NormalEquations(const SampledWindow& window, const float* wanted, int size, float mean) {
     double s[kSums];
     sumProducts(window, wanted, size, mean, s);
     left_ << s[0], s[1], s[2], s[3], s[1], s[4], s[5], s[6], s[2], s[5], s[7], s[8], s[3], s[6],
@@ -129,7 +99,7 @@ std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Templa
   constexpr int kIterations = 10;
   // The error left after a step is a fraction of it.
   constexpr double kConverged = 0.01, kLargestMove = 1.0;
-  const int size = patch.size, side = size + 2;  // a rim for central differences
+  const int size = patch.size;
   if (size < 3 || patch.energy <= 0 || image.type() != CV_8UC1 || !start.allFinite() ||
       start.cwiseAbs().maxCoeff() > 1e6)
     return std::nullopt;
@@ -144,12 +114,11 @@ std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Templa
   // image explains the template and not the other way round: then the residual is the template's
   // own energy times 1 - ZNCC^2, and the least is where the ZNCC is highest, blurred image or not.
   Eigen::Vector2d pixel = start;
-  std::array<float, kLargestSide * kStride> window{};
+  SampledWindow window;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    if (!sampleWindow(image, pixel.x() - side / 2, pixel.y() - side / 2, side, window.data()))
-      return std::nullopt;
+    if (!window.sample(image, pixel, size)) return std::nullopt;
     const std::optional<Eigen::Vector4d> x =
-        NormalEquations(window.data(), wanted.data(), size, mean).solve();
+        NormalEquations(window, wanted.data(), size, mean).solve();
     if (!x || !((*x)[0] > 0.05)) return std::nullopt;  // inverted or vanished contrast
     const Eigen::Vector2d step = x->segment<2>(1) / (*x)[0];
     pixel += step;

@@ -65,15 +65,16 @@ std::optional<PatchView> predictPatchView(const SourcePatch& patch, const Camera
   const std::optional<Eigen::Vector3d> bearing = camera.unproject(patch.pixel, &d_bearing_d_first);
   if (!bearing) return std::nullopt;
 
-  // The plane n^T X = -d through the point with n = -bearing: X = b d / (b . bearing) along a ray
-  // b, so R X + t is parallel to (R + t bearing^T / d) b. (Hartley & Zisserman 2004, section 13.1)
+  // The plane n^T X = d through the point, n^T bearing = 1: X = b d / (n . b) along a ray b, so
+  // R X + t is parallel to (R + t n^T / d) b (Hartley & Zisserman 2004, section 13.1). The inverse
+  // depth along b grows by d(n . b), which is the slope; where the patch faces the first camera, n
+  // is the bearing, and that is none.
   const Eigen::Matrix3d R_now_world = T_world_camera_now.linear().transpose();
   const Eigen::Matrix3d R_now_first = R_now_world * T_world_first.linear();
   const Eigen::Vector3d t_now_first =
       R_now_world * (T_world_first.translation() - T_world_camera_now.translation());
-  const Eigen::Matrix3d homography =
-      R_now_first + inverse_distance * t_now_first * bearing->transpose();
-  const Eigen::Vector3d point_now = homography * *bearing;
+  const Eigen::Vector3d shift = inverse_distance * t_now_first;
+  const Eigen::Vector3d point_now = R_now_first * *bearing + shift;
 
   Eigen::Matrix<double, 2, 3> d_now_d_point;
   const std::optional<Eigen::Vector2d> pixel = camera.project(point_now, &d_now_d_point);
@@ -81,8 +82,12 @@ std::optional<PatchView> predictPatchView(const SourcePatch& patch, const Camera
 
   PatchView view;
   view.pixel = *pixel;
-  view.affine = d_now_d_point * homography * d_bearing_d_first;
-  if (!view.pixel.allFinite() || !view.affine.allFinite()) return std::nullopt;
+  view.parallax_px = d_now_d_point * shift;
+  view.tangent_metric_px2 = (d_bearing_d_first.transpose() * d_bearing_d_first).inverse();
+  view.affine = d_now_d_point * R_now_first * d_bearing_d_first +
+                view.parallax_px * patch.slope_per_px.transpose();
+  if (!view.pixel.allFinite() || !view.affine.allFinite() || !view.tangent_metric_px2.allFinite())
+    return std::nullopt;
   view.scale = std::sqrt(std::abs(view.affine.determinant()));
   const Eigen::Vector3d first_ray = R_now_first * *bearing;
   view.view_angle_rad = std::atan2(first_ray.cross(point_now).norm(), first_ray.dot(point_now));

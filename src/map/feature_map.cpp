@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "active_matching_slam/filter/quantile.h"
+#include "active_matching_slam/image/surface_slope.h"
 
 namespace active_matching_slam {
 namespace {
@@ -133,6 +134,13 @@ void FeatureMap::record(const std::vector<SearchRecord>& searches, std::int64_t 
           kRateMemory * it->drift_px + (1.0 - kRateMemory) * (search.innovation_px - common);
     }
   }
+}
+
+void FeatureMap::learnSlope(const VisibleFeature& feature, const Template& expected,
+                            const cv::Mat& image, const Eigen::Vector2d& pixel) {
+  const auto it = std::lower_bound(features_.begin(), features_.end(), feature.id, byId);
+  if (it == features_.end() || it->id != feature.id) return;
+  active_matching_slam::learnSlope(image, pixel, expected, feature.view, &it->patch);
 }
 
 double FeatureMap::expectedMatches(const std::vector<VisibleFeature>& visible) const {

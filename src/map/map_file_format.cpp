@@ -12,7 +12,7 @@ namespace {
 
 /// Both line ends reveal a transfer as text.
 constexpr char kMagic[9] = "AMSMAP\r\n";
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kHeaderSize = 8 + 4 + 4 + 8;
 constexpr std::size_t kMaximumName = 1024, kMaximumDistortion = 16;
 constexpr std::size_t kMinimumFeature = 8 + 1 + 13 * 8;  ///< bytes of a FeatureState
@@ -184,12 +184,14 @@ void write(const MapFeature& feature, Writer* out) {
   out->reals(patch.center);
   out->reals(patch.T_world_camera.linear());
   out->reals(patch.T_world_camera.translation());
+  out->reals(patch.slope_per_px);
+  out->reals(patch.slope_information_px2);
   out->integer(patch.image.rows);
   for (int row = 0; row < patch.image.rows; ++row)
     out->bytes(patch.image.ptr(row), patch.image.cols);
 }
 
-MapFeature readMapFeature(Reader* in) {
+MapFeature readMapFeature(std::uint32_t version, Reader* in) {
   constexpr int kMaximumCount = std::numeric_limits<int>::max();
   MapFeature feature;
   feature.id = in->integer();
@@ -211,11 +213,24 @@ MapFeature readMapFeature(Reader* in) {
   in->reals(t);
   patch.T_world_camera.linear() = R;
   patch.T_world_camera.translation() = t;
+  if (version >= 3) {
+    in->reals(patch.slope_per_px);
+    in->reals(patch.slope_information_px2);
+  }
   const int size = in->smallInteger("side of a patch", 1, kMaximumPatchSize);
   const char* pixels = in->bytes(static_cast<std::size_t>(size) * size);
   patch.image.create(size, size, CV_8UC1);
   std::memcpy(patch.image.data, pixels, static_cast<std::size_t>(size) * size);
   return feature;
+}
+
+/// Something learnt, with a proper covariance, or nothing.
+bool isSlope(const SourcePatch& patch) {
+  const Eigen::Matrix2d& information = patch.slope_information_px2;
+  if (information.isZero(0.0)) return patch.slope_per_px.isZero(0.0);
+  return patch.slope_per_px.allFinite() && information.allFinite() &&
+         information(0, 1) == information(1, 0) && information(0, 0) > 0.0 &&
+         information(0, 0) * information(1, 1) > information(0, 1) * information(0, 1);
 }
 
 void checkMapFeature(const MapFeature& feature, const MapFileContent& content) {
@@ -233,6 +248,8 @@ void checkMapFeature(const MapFeature& feature, const MapFileContent& content) {
       !(patch.center.minCoeff() >= 0.0) ||
       !(patch.center.maxCoeff() <= content.source_patch_size_px - 1))
     throw std::invalid_argument(name + " has a patch whose centre is out of range");
+  if (!isSlope(patch))
+    throw std::invalid_argument(name + " lies in a surface whose slope is not known");
   if (!(feature.recent_rate >= 0.0 && feature.recent_rate <= 1.0))
     throw std::invalid_argument(name + " has a rate of matches outside [0, 1]");
 }
@@ -273,7 +290,7 @@ MapFileContent readContent(std::uint32_t version, Reader* in) {
     content.features.push_back(readFeatureState(in, static_cast<int>(size)));
     size += content.features.back().size();
   }
-  for (std::size_t i = 0; i < count; ++i) content.map.push_back(readMapFeature(in));
+  for (std::size_t i = 0; i < count; ++i) content.map.push_back(readMapFeature(version, in));
   // Nothing but the lower triangle is left; so its size is known before it is allocated. Version 1
   // has no calibration in it.
   const std::size_t calibration = version < 2 ? CameraError::kCalibrationSize : 0;

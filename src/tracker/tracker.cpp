@@ -104,7 +104,7 @@ void Tracker::Implementation::follow(const cv::Mat& image, TrackedFrame* frame) 
   frame->timings_ms.structure = stage.lap();
   match(image, frame);
   frame->timings_ms.match = stage.lap();
-  correct(frame);
+  correct(image, frame);
   if (start_adjustment_.isActive()) adjustStart(frame);
   frame->timings_ms.update = stage.lap();
   judge();

@@ -62,7 +62,7 @@ class Tracker::Implementation {
   bool isByChance(const MatchResult& result, double expected) const;
   void match(const cv::Mat& image, TrackedFrame* frame);
   std::vector<double> residuals() const;
-  void correct(TrackedFrame* frame);
+  void correct(const cv::Mat& image, TrackedFrame* frame);
   void judge();
   void lose(const std::string& reason);
   void relocalise(const cv::Mat& image, TrackedFrame* frame);

@@ -241,8 +241,8 @@ std::vector<double> Tracker::Implementation::residuals() const {
   return residuals;
 }
 
-/// Fuses the accepted matches.
-void Tracker::Implementation::correct(TrackedFrame* frame) {
+/// Fuses the accepted matches, and learns from them.
+void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame) {
   fused_.clear();
   std::vector<int> matched;
   const int n = prior_.size();
@@ -273,6 +273,7 @@ void Tracker::Implementation::correct(TrackedFrame* frame) {
   std::size_t next = 0;
   for (int i = 0; i < n; ++i) {
     const bool used = next < fused_.size() && fused_[next].id == prior_.ids[i];
+    if (used) map_.learnSlope(candidates_[i], templates_[i], image, fused_[next].pixel);
     const Eigen::Vector2d innovation_px =
         used ? Eigen::Vector2d(fused_[next++].pixel - prior_.mean(i)) : Eigen::Vector2d::Zero();
     const std::int64_t pixels = search_.searchedPixels(i).size();

@@ -47,6 +47,18 @@ class StartOfATrack {
     filter_.restore(camera, filter_.features(), filter_.covariance(), filter_.nextId());
   }
 
+  /// Lets the filter be sure of the distances that it believes in, to this share of them.
+  void beSure(double relative_sigma) {
+    Eigen::MatrixXd covariance = filter_.covariance();
+    for (const FeatureState& feature : filter_.features()) {
+      const int row = feature.offset + FeatureError::kInverseDepth;
+      covariance.row(row).setZero();
+      covariance.col(row).setZero();
+      covariance(row, row) = std::pow(relative_sigma * feature.inverse_depth, 2);
+    }
+    filter_.restore(filter_.camera(), filter_.features(), covariance, filter_.nextId());
+  }
+
   void rescale(double factor) {
     filter_.rescale(factor);
     adjustment_.rescale(factor);
@@ -269,6 +281,24 @@ TEST(StartAdjustment, TheUnitOfTheWayStays) {
   }
   EXPECT_NEAR(product / square, 1.0, 0.02);
   EXPECT_GT(cosineBetween(second->camera.position_world, truth.cameras[23].position_world), 0.99);
+}
+
+TEST(StartAdjustment, EndsWhenTheFilterKnowsMore) {
+  constexpr double kEnough = 0.005, kTooLittle = 0.002;  // parallax, for such steps [m]
+  constexpr double kSure = 1e-3, kLessSure = 0.02;       // than what the images tell
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    StartOfATrack vague(track(12, kEnough, seed)), known(track(12, kEnough, seed)),
+        known_less(track(12, kEnough, seed)), early(track(12, kTooLittle, seed));
+    known.beSure(kSure);
+    known_less.beSure(kLessSure);
+    early.beSure(kSure);
+    EXPECT_FALSE(known.adjustAfter(11));
+    EXPECT_FALSE(known.adjustment().isActive());
+    for (StartOfATrack* start : {&vague, &known_less, &early}) {
+      EXPECT_TRUE(start->adjustAfter(11));
+      EXPECT_TRUE(start->adjustment().isActive());
+    }
+  }
 }
 
 TEST(StartAdjustment, EndsWhenNoEarlierImageIsInSight) {

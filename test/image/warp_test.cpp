@@ -4,99 +4,12 @@
 
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 
 #include "active_matching_slam/filter/ekf.h"
-#include "textures.h"
+#include "textured_plane.h"
 
 namespace active_matching_slam {
 namespace {
-
-CameraModel wideCamera() {
-  CameraCalibration calibration;
-  calibration.width = 320;
-  calibration.height = 240;
-  calibration.fx = 195.0;
-  calibration.fy = 196.0;
-  calibration.cx = 162.0;
-  calibration.cy = 121.0;
-  calibration.distortion_model = DistortionModel::kPlumbBob;
-  calibration.distortion = {-0.25, 0.06, 0.001, -0.0005, 0.0};
-  return CameraModel(calibration);
-}
-
-Eigen::Isometry3d pose(const Eigen::Vector3d& position, const Eigen::Vector3d& rotation) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  if (rotation.norm() > 0.0)
-    T.linear() = Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix();
-  T.translation() = position;
-  return T;
-}
-
-/// A textured plane through a point, facing the first camera, and what cameras see of it exactly.
-class Plane {
- public:
-  Plane(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, double wave)
-      : point_(point),
-        normal_(normal),
-        x_(normal.unitOrthogonal()),
-        y_(normal.cross(x_)),
-        texture_(21, wave, 35.0) {}
-
-  /// The plane's point seen at a pixel.
-  Eigen::Vector3d at(const CameraModel& camera, const Eigen::Isometry3d& T_world_camera,
-                     const Eigen::Vector2d& pixel) const {
-    const Eigen::Vector3d ray = T_world_camera.linear() * *camera.unproject(pixel);
-    const Eigen::Vector3d& origin = T_world_camera.translation();
-    return origin + ray * (normal_.dot(point_ - origin) / normal_.dot(ray));
-  }
-  /// Grey level at a pixel: the mean over its area.
-  double grey(const CameraModel& camera, const Eigen::Isometry3d& T_world_camera,
-              const Eigen::Vector2d& pixel) const {
-    double sum = 0.0;
-    for (int j = 0; j < 3; ++j)
-      for (int i = 0; i < 3; ++i) {
-        const Eigen::Vector3d d =
-            at(camera, T_world_camera, pixel + Eigen::Vector2d(i - 1, j - 1) / 3.0) - point_;
-        sum += texture_.value(d.dot(x_), d.dot(y_));
-      }
-    return sum / 9.0;
-  }
-  /// Image around a pixel; the rest stays black.
-  cv::Mat render(const CameraModel& camera, const Eigen::Isometry3d& T_world_camera,
-                 const Eigen::Vector2d& pixel, int half) const {
-    cv::Mat image(camera.height(), camera.width(), CV_8UC1, cv::Scalar(0));
-    const int center_u = static_cast<int>(pixel.x()), center_v = static_cast<int>(pixel.y());
-    for (int v = center_v - half; v <= center_v + half; ++v)
-      for (int u = center_u - half; u <= center_u + half; ++u)
-        image.at<std::uint8_t>(v, u) =
-            WaveTexture::toGrey(grey(camera, T_world_camera, Eigen::Vector2d(u, v)));
-    return image;
-  }
-
- private:
-  Eigen::Vector3d point_, normal_, x_, y_;
-  WaveTexture texture_;
-};
-
-/// What the template should be: the plane seen exactly, on the grid around the predicted pixel.
-cv::Mat exactTemplate(const Plane& plane, const CameraModel& camera, const Eigen::Isometry3d& now,
-                      const Eigen::Vector2d& pixel, int size) {
-  cv::Mat image(size, size, CV_8UC1);
-  for (int j = 0; j < size; ++j)
-    for (int i = 0; i < size; ++i)
-      image.at<std::uint8_t>(j, i) = WaveTexture::toGrey(
-          plane.grey(camera, now, pixel + Eigen::Vector2d(i - size / 2, j - size / 2)));
-  return image;
-}
-
-double correlation(const cv::Mat& a, const cv::Mat& b) {
-  cv::Mat score;
-  cv::matchTemplate(a, b, score, cv::TM_CCOEFF_NORMED);
-  return score.at<float>(0);
-}
-
-Eigen::Vector4d finitePoint(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z(), 1.0}; }
 
 struct Move {
   const char* name;
@@ -219,21 +132,47 @@ TEST_F(WarpTest, ReportsScaleAndViewAngle) {
 
 TEST_F(WarpTest, AffineIsTheDerivativeOfThePointsMotion) {
   const Eigen::Isometry3d now = pose({0.2, -0.1, 0.1}, {0.1, -0.15, 0.3});
-  const auto view = predictPatchView(patch_, camera_, now, finitePoint(point_));
-  ASSERT_TRUE(view);
-  const Eigen::Vector3d normal = point_.normalized();
-  const auto moved = [&](const Eigen::Vector2d& pixel) {
-    const Eigen::Vector3d ray = *camera_.unproject(pixel);
-    const Eigen::Vector3d on_plane = ray * (normal.dot(point_) / normal.dot(ray));
-    return *camera_.project(now.inverse() * on_plane);
-  };
-  const double h = 1e-3;
-  Eigen::Matrix2d numerical;
-  for (int k = 0; k < 2; ++k) {
-    const Eigen::Vector2d step = h * Eigen::Vector2d::Unit(k);
-    numerical.col(k) = (moved(patch_.pixel + step) - moved(patch_.pixel - step)) / (2 * h);
+  Eigen::Matrix<double, 3, 2> d_bearing_d_pixel;
+  const Eigen::Vector3d bearing = *camera_.unproject(patch_.pixel, &d_bearing_d_pixel);
+  for (const Eigen::Vector3d& tilt :
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.8, 0, 0), Eigen::Vector3d(-0.5, 1.2, 0.1)}) {
+    const Eigen::Vector3d across = tilt - bearing * bearing.dot(tilt);
+    const Eigen::Vector3d normal = bearing + across;
+    patch_.slope_per_px = d_bearing_d_pixel.transpose() * normal;
+    const auto view = predictPatchView(patch_, camera_, now, finitePoint(point_));
+    ASSERT_TRUE(view);
+    const auto moved = [&](const Eigen::Vector2d& pixel) {
+      const Eigen::Vector3d ray = *camera_.unproject(pixel);
+      const Eigen::Vector3d on_plane = ray * (normal.dot(point_) / normal.dot(ray));
+      return *camera_.project(now.inverse() * on_plane);
+    };
+    const double h = 1e-3;
+    Eigen::Matrix2d numerical;
+    for (int k = 0; k < 2; ++k) {
+      const Eigen::Vector2d step = h * Eigen::Vector2d::Unit(k);
+      numerical.col(k) = (moved(patch_.pixel + step) - moved(patch_.pixel - step)) / (2 * h);
+    }
+    EXPECT_LT((view->affine - numerical).norm(), 1e-6) << "tilt " << tilt.transpose();
+    EXPECT_NEAR(patch_.slope_per_px.dot(view->tangent_metric_px2 * patch_.slope_per_px),
+                across.squaredNorm(), 1e-9);
   }
-  EXPECT_LT((view->affine - numerical).norm(), 1e-6);
+}
+
+TEST_F(WarpTest, ParallaxIsWhatASlopeDoesToTheAffine) {
+  const Eigen::Isometry3d now = pose({0.2, -0.1, 0.1}, {0.1, -0.15, 0.3});
+  const Eigen::Vector2d slope(2e-3, -3e-3);
+  const auto facing = predictPatchView(patch_, camera_, now, finitePoint(point_));
+  patch_.slope_per_px = slope;
+  const auto sloping = predictPatchView(patch_, camera_, now, finitePoint(point_));
+  ASSERT_TRUE(facing && sloping);
+  EXPECT_EQ(sloping->pixel, facing->pixel);
+  EXPECT_EQ(sloping->parallax_px, facing->parallax_px);
+  EXPECT_LT((sloping->affine - facing->affine - facing->parallax_px * slope.transpose()).norm(),
+            1e-12);
+  const auto infinite =
+      predictPatchView(patch_, camera_, now, {point_.x(), point_.y(), point_.z(), 0.0});
+  ASSERT_TRUE(infinite);
+  EXPECT_EQ(infinite->parallax_px.norm(), 0.0);
 }
 
 TEST_F(WarpTest, IsRefusedForPointsThatCannotBeSeen) {

@@ -63,6 +63,10 @@ MapFileContent smallMap() {
       feature.patch.image.data[i] = static_cast<std::uint8_t>(state.id + 31 * i);
     feature.patch.pixel = {100.25, 80.5};
     feature.patch.center = {7.0, 7.0};
+    if (state.id != 1) {  // of one nothing has been learnt yet
+      feature.patch.slope_per_px = {0.001 * static_cast<double>(state.id), -0.0035};
+      feature.patch.slope_information_px2 << 4.5e5, 1.25e4, 1.25e4, 3.75e5;
+    }
     content.map.push_back(feature);
   }
   return content;
@@ -127,6 +131,8 @@ TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
     EXPECT_EQ(read.map[i].successes, 5);
     EXPECT_EQ(read.map[i].rates.successes, 41 + i);
     EXPECT_EQ(read.map[i].rates.pixels, 100000);
+    EXPECT_EQ(read.map[i].patch.slope_per_px, written.map[i].patch.slope_per_px);
+    EXPECT_EQ(read.map[i].patch.slope_information_px2, written.map[i].patch.slope_information_px2);
   }
   EXPECT_EQ(serializeMap(read), serializeMap(written));
 }
@@ -206,8 +212,8 @@ TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
   bytes[bytes.size() / 2] ^= 1;
   expectRefused(bytes, "damaged");
   bytes = serializeMap(smallMap());
-  setNumber(&bytes, 8, 3, 4);
-  expectRefused(bytes, "version 3");
+  setNumber(&bytes, 8, 4, 4);
+  expectRefused(bytes, "version 4");
   bytes = serializeMap(smallMap());
   double infinity = std::numeric_limits<double>::infinity();
   std::memcpy(&bytes[bytes.size() - 8], &infinity, 8);
@@ -222,9 +228,61 @@ TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
   expectRefused(bytes, "name");
 }
 
+TEST_F(MapFile, RefusesASlopeThatIsNone) {
+  const auto expectSlopeRefused = [](const Eigen::Vector2d& slope, const Eigen::Matrix2d& known) {
+    MapFileContent content = smallMap();
+    content.map[1].patch.slope_per_px = slope;
+    content.map[1].patch.slope_information_px2 = known;
+    try {
+      serializeMap(content);
+      FAIL() << "accepted: " << slope.transpose() << "; " << known;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_STREQ(error.what(), "feature 2 lies in a surface whose slope is not known");
+    }
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Vector2d slope(0.001, 0.002);
+  const Eigen::Matrix2d known = 1e5 * Eigen::Matrix2d::Identity();
+  Eigen::Matrix2d skew = known, indefinite = known;
+  skew(0, 1) = 10.0;
+  indefinite(0, 1) = indefinite(1, 0) = 2e5;
+  expectSlopeRefused({nan, 0.0}, known);
+  expectSlopeRefused(slope, nan * known);
+  expectSlopeRefused(slope, Eigen::Matrix2d::Zero());
+  expectSlopeRefused(slope, -known);
+  expectSlopeRefused(slope, skew);
+  expectSlopeRefused(slope, indefinite);
+}
+
+/// What version 2 would have written: no slopes.
+std::string version2Of(const MapFileContent& content) {
+  std::string bytes = serializeMap(content);
+  for (const MapFeature& feature : content.map) {
+    std::string side(8, 0);
+    setNumber(&side, 0, static_cast<std::uint64_t>(feature.patch.image.rows), 8);
+    const std::string image(reinterpret_cast<const char*>(feature.patch.image.data),
+                            feature.patch.image.total());
+    bytes.erase(bytes.find(side + image) - 6 * 8, 6 * 8);
+  }
+  setNumber(&bytes, 8, 2, 4);
+  return bytes;
+}
+
+TEST_F(MapFile, AMapOfVersion2IsReadAndItsSurfacesFaceTheirFirstCameras) {
+  MapFileContent content = smallMap();
+  std::string bytes = version2Of(content);
+  seal(&bytes);
+  const MapFileContent read = parseMap(bytes);
+  for (MapFeature& feature : content.map) {
+    feature.patch.slope_per_px.setZero();
+    feature.patch.slope_information_px2.setZero();
+  }
+  EXPECT_EQ(serializeMap(read), serializeMap(content));
+}
+
 TEST_F(MapFile, AMapOfVersion1IsReadAndItsCalibrationIsInDoubtAnew) {
   const MapFileContent content = smallMap();
-  std::string bytes = serializeMap(content);
+  std::string bytes = version2Of(content);
   // What version 1 does not have: five numbers of the camera and their rows of the covariance.
   std::string readout(8, 0);
   std::memcpy(&readout[0], &content.camera_state.readout_s, 8);

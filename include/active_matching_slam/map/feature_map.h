@@ -78,6 +78,11 @@ class FeatureMap {
   /// image (blur, occlusion), not of the features, and counts for the matched ones only.
   void record(const std::vector<SearchRecord>& searches, std::int64_t frame);
 
+  /// Learns how the surface of a feature is inclined, from its match at `pixel` of `image`, where
+  /// `expected` was looked for.
+  void learnSlope(const VisibleFeature& feature, const Template& expected, const cv::Mat& image,
+                  const Eigen::Vector2d& pixel);
+
   /// How many of these features will probably be matched, by their recent record.
   double expectedMatches(const std::vector<VisibleFeature>& visible) const;
 
