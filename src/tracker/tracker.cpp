@@ -148,8 +148,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     const bool is_astray = poor_frames_ > 0 && poor_frames_ % kFramesBetweenLooks == 0;
     if (!(is_gap || is_astray) || !findInMap(image, frame.get())) follow(image, frame.get());
   }
-  image.copyTo(previous_image_);  // the caller may use its memory again
-  if (poor_frames_ == 0) image.copyTo(image_before_);
+  previous_image_ = image.clone();  // the caller may use its memory again
+  if (poor_frames_ == 0) image_before_ = previous_image_;
   frame->state = state_;
   if (!reason_.empty()) frame->reason = reason_;
   describe(frame.get());
