@@ -6,7 +6,7 @@
 
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/quantile.h"
-#include "active_matching_slam/filter/rotation.h"
+#include "adjusted_start.h"
 #include "start_readings.h"
 
 namespace active_matching_slam {
@@ -24,10 +24,8 @@ constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
-constexpr double kScaleSigma = 1e-3;  ///< of the free unit, relative
-/// The start ends when the filter knows depths by so much better, at so much parallax or more.
-constexpr double kClearlyBetter = 0.7, kParallaxToTrustPx = 5.0;
-constexpr double kMostMisread = 0.1;  ///< of a way's square that a change of unit leaves
+constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
+constexpr double kMostMisread = 0.1;        ///< of a way's square that a change of unit leaves
 
 const FeatureMeasurement* find(const std::vector<FeatureMeasurement>& measurements, FeatureId id) {
   const auto it =
@@ -144,28 +142,6 @@ std::optional<double> parallaxBetween(const CameraModel& model,
   return quantileOf(std::move(angles), kAllButNear) / of_noise * model.calibration().fx;
 }
 
-/// Relative standard deviation of the distance from the world's origin, median.
-double depthSigma(const Ekf& filter, const std::vector<FeatureState>& features) {
-  std::vector<double> sigmas;
-  for (const FeatureState& feature : features) {
-    const FeatureState& known = *filter.find(feature.id);
-    const Eigen::Vector3d position = known.position();
-    const double variance = position.dot(filter.positionCovariance(known) * position);
-    sigmas.push_back(std::sqrt(std::max(variance, 0.0)) / position.squaredNorm());
-  }
-  return medianOf(std::move(sigmas));
-}
-
-/// The same of an adjusted start, all of whose features are anchored there.
-double depthSigma(const AdjustedStart& start) {
-  std::vector<double> sigmas;
-  for (const FeatureState& feature : start.features) {
-    const int row = feature.offset + FeatureError::kInverseDepth;
-    sigmas.push_back(std::sqrt(std::max(start.covariance(row, row), 0.0)) / feature.inverse_depth);
-  }
-  return medianOf(std::move(sigmas));
-}
-
 /// Takes out features that are no points of the scene: their image points are outliers on the
 /// whole. Both bundles have the same features and observations.
 void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, Bundle* before,
@@ -214,16 +190,6 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
 }
 
 }  // namespace
-
-Eigen::Isometry3d AdjustedStart::corrected(std::int64_t image,
-                                           const Eigen::Isometry3d& T_world_camera) const {
-  const auto nearest =
-      std::min_element(moves.begin(), moves.end(), [image](const Move& a, const Move& b) {
-        return std::abs(a.image - image) < std::abs(b.image - image);
-      });
-  if (nearest == moves.end()) return T_world_camera;
-  return nearest->T_world_camera_after * nearest->T_world_camera_before.inverse() * T_world_camera;
-}
 
 void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasurement>& first) {
   is_active_ = true;
@@ -382,18 +348,17 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
       drift = std::pow(drift, 1.0 / (1.0 + std::pow(options.sigma_px / last_parallax_px_, 2)));
   }
   rescaleBundle(by_depths * drift / unit_drift_, &*reading);
-  auto start = makeState(model, filter, options, *reading, ids,
-                         keeps_way ? BundleUnit::kWay : BundleUnit::kDepths);
-  if (start && *parallax_px >= kParallaxToTrustPx &&
-      depthSigma(filter, start->features) < kClearlyBetter * depthSigma(*start)) {
+  auto start = makeAdjustedStart(model, filter, options, *reading, ids,
+                                 keeps_way ? BundleUnit::kWay : BundleUnit::kDepths,
+                                 images_.back().interval_s);
+  if (!start) return std::nullopt;
+  if (*parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();
     return std::nullopt;
   }
-  if (start) {
-    adopt(*reading, ids, &*start);
-    unit_drift_ = drift;
-    last_parallax_px_ = *parallax_px;
-  }
+  adopt(*reading, ids, &*start);
+  unit_drift_ = drift;
+  last_parallax_px_ = *parallax_px;
   return start;
 }
 
@@ -410,74 +375,6 @@ void StartAdjustment::adopt(const Bundle& reading, const std::vector<FeatureId>&
     while (feature->id != ids[i]) ++feature;  // both ascend
     *feature = reading.features[i];
   }
-}
-
-std::optional<AdjustedStart> StartAdjustment::makeState(const CameraModel& model, const Ekf& filter,
-                                                        const BundleOptions& options,
-                                                        const Bundle& bundle,
-                                                        const std::vector<FeatureId>& ids,
-                                                        BundleUnit unit) const {
-  const int last = static_cast<int>(bundle.cameras.size()) - 1;
-  const double dt = images_.back().interval_s;
-  BundleOptions doubting_lens = options;
-  doubting_lens.sigma_calibration = calibrationSigmas(filter.options());
-  const Eigen::MatrixXd joint =
-      bundleCovariance(model, doubting_lens, bundle, last - 1, unit, kScaleSigma);
-  if (joint.size() == 0 || !joint.allFinite() || !(dt > 0.0)) return std::nullopt;
-
-  AdjustedStart start;
-  start.camera = bundle.cameras[last];
-  const CameraState& before = bundle.cameras[last - 1];
-  start.camera.velocity_world = (start.camera.position_world - before.position_world) / dt;
-  start.camera.angular_velocity_camera =
-      vectorFromRotation(before.q_world_camera.conjugate() * start.camera.q_world_camera) / dt;
-
-  start.camera.readout_s = bundle.calibration[0];
-  start.camera.lens = {bundle.calibration[1], bundle.calibration[2], bundle.calibration.tail<2>()};
-
-  // The camera's error by those of the cameras before last and last and of the calibration.
-  constexpr int kBefore = 0, kLast = 6, kCalibration = 12,
-                kJoint = kCalibration + CameraError::kCalibrationSize;
-  using CameraJacobian = Eigen::Matrix<double, CameraError::kSize, kJoint>;
-  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d R_camera_world = start.camera.q_world_camera.toRotationMatrix().transpose();
-  CameraJacobian J = CameraJacobian::Zero();
-  J.block<3, 3>(CameraError::kPosition, kLast) = I;
-  J.block<3, 3>(CameraError::kRotation, kLast + 3) = I;
-  J.block<3, 3>(CameraError::kVelocity, kBefore) = -I / dt;
-  J.block<3, 3>(CameraError::kVelocity, kLast) = I / dt;
-  J.block<3, 3>(CameraError::kAngularVelocity, kBefore + 3) = -R_camera_world / dt;
-  J.block<3, 3>(CameraError::kAngularVelocity, kLast + 3) = R_camera_world / dt;
-  J.bottomRightCorner<CameraError::kCalibrationSize, CameraError::kCalibrationSize>().setIdentity();
-
-  std::vector<int> kept;
-  for (std::size_t i = 0; i < ids.size(); ++i)
-    if (filter.find(ids[i]) != nullptr) kept.push_back(static_cast<int>(i));
-  const int F = static_cast<int>(kept.size());
-  start.covariance = Eigen::MatrixXd::Zero(CameraError::kSize + 6 * F, CameraError::kSize + 6 * F);
-  auto camera = start.covariance.topLeftCorner<CameraError::kSize, CameraError::kSize>();
-  camera = J * joint.topLeftCorner<kJoint, kJoint>() * J.transpose();
-  camera = 0.5 * (camera + camera.transpose()).eval();
-  for (int i = 0; i < F; ++i) {
-    FeatureState feature = bundle.features[kept[i]];
-    feature.id = ids[kept[i]];
-    feature.offset = CameraError::kSize + 6 * i;
-    start.features.push_back(feature);
-    const int row = feature.offset + FeatureError::kBearing, from = kJoint + 3 * kept[i];
-    auto columns = start.covariance.middleCols<3>(row);
-    columns.topRows<CameraError::kSize>() = J * joint.block<kJoint, 3>(0, from);
-    start.covariance.block<3, CameraError::kSize>(row, 0) =
-        columns.topRows<CameraError::kSize>().transpose();
-    for (int k = 0; k < F; ++k)
-      columns.middleRows<3>(CameraError::kSize + 6 * k + FeatureError::kBearing) =
-          joint.block<3, 3>(kJoint + 3 * kept[k], from);
-  }
-  const FilterOptions& noise = filter.options();
-  start.covariance.diagonal().segment<3>(CameraError::kVelocity).array() +=
-      std::pow(noise.sigma_acceleration_mps2 * dt, 2);
-  start.covariance.diagonal().segment<3>(CameraError::kAngularVelocity).array() +=
-      std::pow(noise.sigma_angular_acceleration_rps2 * dt, 2);
-  return start;
 }
 
 }  // namespace active_matching_slam

@@ -27,8 +27,10 @@ class SampledWindow {
   static constexpr int kStride = 40;
 
   /// Interpolates a window for a template of side `size` around `centre`; false when its support
-  /// leaves the image.
+  /// leaves the image, `centre` is not finite, or the image is not 8-bit grey.
   bool sample(const cv::Mat& image, const Eigen::Vector2d& centre, int size) {
+    if (image.type() != CV_8UC1 || !centre.allFinite() || centre.cwiseAbs().maxCoeff() > 1e6)
+      return false;
     const int side = size + 2;
     const double u = centre.x() - side / 2, v = centre.y() - side / 2;
     const int first_u = static_cast<int>(std::floor(u)), first_v = static_cast<int>(std::floor(v));

@@ -100,9 +100,7 @@ std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Templa
   // The error left after a step is a fraction of it.
   constexpr double kConverged = 0.01, kLargestMove = 1.0;
   const int size = patch.size;
-  if (size < 3 || patch.energy <= 0 || image.type() != CV_8UC1 || !start.allFinite() ||
-      start.cwiseAbs().maxCoeff() > 1e6)
-    return std::nullopt;
+  if (size < 3 || patch.energy <= 0) return std::nullopt;
 
   const float mean = static_cast<float>(patch.sum) / static_cast<float>(size * size);
   std::array<float, Template::kMaximumSize * kStride> wanted;

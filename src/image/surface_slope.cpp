@@ -30,8 +30,7 @@ using Right = Eigen::Matrix<double, kUnknowns, 1>;
 bool learnSlope(const cv::Mat& image, const Eigen::Vector2d& pixel, const Template& expected,
                 const PatchView& view, SourcePatch* patch) {
   const int size = expected.size, half = size / 2;
-  if (!(view.parallax_px.norm() >= kLeastParallaxPx) || size < 3 || expected.energy <= 0 ||
-      image.type() != CV_8UC1 || !(pixel.cwiseAbs().maxCoeff() <= 1e6))
+  if (!(view.parallax_px.norm() >= kLeastParallaxPx) || size < 3 || expected.energy <= 0)
     return false;
   SampledWindow window;
   if (!window.sample(image, pixel, size)) return false;

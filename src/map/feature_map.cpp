@@ -36,6 +36,10 @@ const MapFeature* FeatureMap::find(FeatureId id) const {
   return it != features_.end() && it->id == id ? &*it : nullptr;
 }
 
+MapFeature* FeatureMap::findMutable(FeatureId id) {
+  return const_cast<MapFeature*>(find(id));
+}
+
 void FeatureMap::clear() { features_.clear(); }
 
 void FeatureMap::add(MapFeature feature) {
@@ -121,26 +125,25 @@ void FeatureMap::record(const std::vector<SearchRecord>& searches, std::int64_t 
   const bool image_at_fault = 3 * matched < static_cast<std::ptrdiff_t>(searches.size());
   const Eigen::Vector2d common = medianInnovation(searches);
   for (const SearchRecord& search : searches) {
-    const auto it = std::lower_bound(features_.begin(), features_.end(), search.id, byId);
-    if (it == features_.end() || it->id != search.id) continue;
-    if (!search.matched && image_at_fault) continue;
-    ++it->attempts;
-    it->rates.add(search.matched, search.matches, search.pixels);
-    it->recent_rate = kRateMemory * it->recent_rate + (search.matched ? 1.0 - kRateMemory : 0.0);
+    MapFeature* feature = findMutable(search.id);
+    if (!feature || (!search.matched && image_at_fault)) continue;
+    ++feature->attempts;
+    feature->rates.add(search.matched, search.matches, search.pixels);
+    feature->recent_rate =
+        kRateMemory * feature->recent_rate + (search.matched ? 1.0 - kRateMemory : 0.0);
     if (search.matched) {
-      ++it->successes;
-      it->last_matched_frame = frame;
-      it->drift_px =
-          kRateMemory * it->drift_px + (1.0 - kRateMemory) * (search.innovation_px - common);
+      ++feature->successes;
+      feature->last_matched_frame = frame;
+      feature->drift_px =
+          kRateMemory * feature->drift_px + (1.0 - kRateMemory) * (search.innovation_px - common);
     }
   }
 }
 
 void FeatureMap::learnSlope(const VisibleFeature& feature, const Template& expected,
                             const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  const auto it = std::lower_bound(features_.begin(), features_.end(), feature.id, byId);
-  if (it == features_.end() || it->id != feature.id) return;
-  active_matching_slam::learnSlope(image, pixel, expected, feature.view, &it->patch);
+  if (MapFeature* known = findMutable(feature.id))
+    active_matching_slam::learnSlope(image, pixel, expected, feature.view, &known->patch);
 }
 
 double FeatureMap::expectedMatches(const std::vector<VisibleFeature>& visible) const {

@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -20,7 +22,7 @@ class InclinedPlane {
  public:
   /// `tangent`: of the angles by which the plane is turned off the first ray, two directions
   /// across it.
-  explicit InclinedPlane(const Eigen::Vector2d& tangent, double wave_m = 0.05)
+  explicit InclinedPlane(const Eigen::Vector2d& tangent)
       : camera_(wideCamera()), first_(pose({0.1, -0.2, 0.3}, {0.05, -0.1, 0.02})) {
     Eigen::Matrix<double, 3, 2> d_bearing_d_pixel;
     const Eigen::Vector3d bearing = *camera_.unproject(pixel_, &d_bearing_d_pixel);
@@ -28,7 +30,7 @@ class InclinedPlane {
     const Eigen::Vector3d normal = bearing + tangent.x() * x + tangent.y() * y;
     slope_ = d_bearing_d_pixel.transpose() * normal;
     point_ = first_ * (1.5 * bearing);
-    plane_.emplace(point_, -(first_.linear() * normal).normalized(), wave_m);
+    plane_.emplace(point_, -(first_.linear() * normal).normalized(), 0.05);
     patch_ = *extractSourcePatch(plane_->render(camera_, first_, pixel_, 20), pixel_, first_, 31);
   }
 
@@ -44,7 +46,7 @@ class InclinedPlane {
   }
 
   PatchView viewFrom(const Eigen::Isometry3d& now) const {
-    return *predictPatchView(patch_, camera_, now, finitePoint());
+    return *predictPatchView(patch_, camera_, now, finitePoint(point_));
   }
   Template expectedFrom(const Eigen::Isometry3d& now) const {
     Template expected;
@@ -74,8 +76,6 @@ class InclinedPlane {
   const Eigen::Isometry3d& first() const { return first_; }
 
  private:
-  Eigen::Vector4d finitePoint() const { return active_matching_slam::finitePoint(point_); }
-
   const Eigen::Vector2d pixel_{205.0, 90.0};
   CameraModel camera_;
   Eigen::Isometry3d first_;

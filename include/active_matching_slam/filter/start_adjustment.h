@@ -32,7 +32,8 @@ struct AdjustedStart {
 /// matches of the first images are kept, and when they show parallax, cameras and depths are
 /// adjusted together, from what the filter believes and from its opposites; the best, if it is
 /// clearly the best, becomes the filter's state. Repeated as parallax or time grow, also when the
-/// first image is out of sight, until depths are known well enough to be followed linearly.
+/// first image is out of sight, until depths are known well enough to be followed linearly, or the
+/// filter, which has seen every image, knows them clearly better than the images kept here tell.
 class StartAdjustment {
  public:
   /// Starts anew with image `index`: `first` is where it shows the filter's features; its camera is
@@ -74,9 +75,6 @@ class StartAdjustment {
   bool isTime(double parallax_px, double sigma_px);
   Bundle makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const;
   void adopt(const Bundle& reading, const std::vector<FeatureId>& ids, AdjustedStart* start);
-  std::optional<AdjustedStart> makeState(const CameraModel& model, const Ekf& filter,
-                                         const BundleOptions& options, const Bundle& bundle,
-                                         const std::vector<FeatureId>& ids, BundleUnit unit) const;
 
   bool is_active_ = false;
   std::vector<Image> images_;  ///< the first, some between, the last two

@@ -30,10 +30,10 @@ struct PatchView {
 Eigen::Vector4d homogeneousPosition(const FeatureState& feature);
 
 /// View of a locally planar patch of the slope known. The homography R - t n^T / d between bearings
-/// is exact; together with both lens mappings it is linearised at
-/// the centre, which over an 11 x 11 template is off by some hundredths of a pixel at its corners.
-/// Works for points at infinity (rotation only). Empty when the point is behind a camera, at a
-/// camera's centre, outside the lens model, or not finite.
+/// is exact; together with both lens mappings it is linearised at the centre, which over an 11 x 11
+/// template is off by some hundredths of a pixel at its corners. Works for points at infinity
+/// (rotation only). Empty when the point is behind a camera, at a camera's centre, outside the lens
+/// model, or not finite.
 std::optional<PatchView> predictPatchView(const SourcePatch& patch, const CameraModel& camera,
                                           const Eigen::Isometry3d& T_world_camera_now,
                                           const Eigen::Vector4d& point_world_homogeneous);

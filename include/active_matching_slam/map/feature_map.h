@@ -99,6 +99,8 @@ class FeatureMap {
   std::vector<FeatureId> leastInformative(const Ekf& filter, int count) const;
 
  private:
+  MapFeature* findMutable(FeatureId id);  ///< null when unknown
+
   std::vector<MapFeature> features_;  ///< ascending id
   std::int64_t retired_total_ = 0;
 };

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "active_matching_slam/filter/bundle_adjustment.h"
+#include "active_matching_slam/filter/start_adjustment.h"
+
+namespace active_matching_slam {
+
+/// The state that a filter would have after the images of `bundle`, the last of which was taken
+/// `interval_s` after the one before: mean and covariance of the last camera, its velocities, the
+/// calibration, and of those features that `filter` has. `ids` are the bundle's features',
+/// ascending. Empty where the bundle leaves them open. Moves are left to the caller.
+std::optional<AdjustedStart> makeAdjustedStart(const CameraModel& model, const Ekf& filter,
+                                               const BundleOptions& options, const Bundle& bundle,
+                                               const std::vector<FeatureId>& ids, BundleUnit unit,
+                                               double interval_s);
+
+/// Whether `filter` knows the distances of the features of `start` clearly better than that does.
+bool knowsMore(const Ekf& filter, const AdjustedStart& start);
+
+}  // namespace active_matching_slam
