@@ -19,12 +19,30 @@ struct Cut {
   double change_bits = -std::numeric_limits<double>::infinity();
 };
 
-/// The hierarchy's tree (or forest), each node under its parent, some links of which are cut.
+/// The hierarchy's merges, and links without information that join what is not connected where
+/// features were initialised one after the other: close ids first.
+std::vector<SubmapMerge> connectedMerges(const SubmapHierarchy& hierarchy) {
+  const int nodes = static_cast<int>(hierarchy.ids.size());
+  std::vector<SubmapMerge> merges = hierarchy.merges;
+  DisjointSets sets(nodes);
+  for (const SubmapMerge& merge : merges) sets.unite(merge.first, merge.second);
+  std::vector<int> followed;  // by a feature of another part
+  for (int i = 0; i + 1 < nodes; ++i)
+    if (sets.find(i) != sets.find(i + 1)) followed.push_back(i);
+  const auto gap = [&hierarchy](int i) { return hierarchy.ids[i + 1] - hierarchy.ids[i]; };
+  std::stable_sort(followed.begin(), followed.end(),
+                   [&gap](int a, int b) { return gap(a) < gap(b); });
+  for (const int i : followed)
+    if (sets.unite(i, i + 1)) merges.push_back({i, i + 1, 0.0, 0});
+  return merges;
+}
+
+/// The hierarchy's tree, each node under its parent, some links of which are cut.
 class CutTree {
  public:
   CutTree(std::vector<WeightedEdge> edges, const SubmapHierarchy& hierarchy)
       : edges_(std::move(edges)), nodes_(static_cast<int>(hierarchy.ids.size())) {
-    grow(hierarchy.merges);
+    grow(connectedMerges(hierarchy));
     for (const WeightedEdge& edge : edges_) meeting_.push_back(meetingOf(edge));
     label();
   }
@@ -38,7 +56,8 @@ class CutTree {
     label();
   }
 
-  /// The cut that costs least of those that leave no part below `least` features.
+  /// The cut that costs least of those that leave no part below `least` features; of equals that of
+  /// the latest merge.
   Cut best(double least) const {
     Eigen::VectorXd crossing = Eigen::VectorXd::Zero(nodes_);  // all that a cut separates [bits]
     Eigen::VectorXi size = Eigen::VectorXi::Ones(nodes_);
@@ -81,7 +100,8 @@ class CutTree {
       // other parts each side now has a strongest of its own: the weaker of them is won.
       const double change =
           link_bits_[node] - crossing[node] + strongest.col(node).cwiseMin(outside.col(node)).sum();
-      if (change > best.change_bits) best = {node, change};
+      const bool wins_tie = change == best.change_bits && link_[node] > link_[best.node];
+      if (change > best.change_bits || wins_tie) best = {node, change};
     }
     return best;
   }
@@ -97,12 +117,13 @@ class CutTree {
   bool isTop(int node) const { return parent_[node] == kNone || is_cut_[node] != 0; }
 
   void grow(const std::vector<SubmapMerge>& merges) {
-    std::vector<std::vector<std::pair<int, double>>> neighbours(nodes_);
-    for (const SubmapMerge& merge : merges) {
-      neighbours[merge.first].emplace_back(merge.second, merge.information_bits);
-      neighbours[merge.second].emplace_back(merge.first, merge.information_bits);
+    std::vector<std::vector<std::pair<int, int>>> neighbours(nodes_);  // and the merge's index
+    for (int m = 0; m < static_cast<int>(merges.size()); ++m) {
+      neighbours[merges[m].first].emplace_back(merges[m].second, m);
+      neighbours[merges[m].second].emplace_back(merges[m].first, m);
     }
     parent_.assign(nodes_, kNone);
+    link_.assign(nodes_, kNone);
     link_bits_.assign(nodes_, 0.0);
     depth_.assign(nodes_, 0);
     is_cut_.assign(nodes_, 0);
@@ -113,11 +134,12 @@ class CutTree {
       std::size_t at = order_.size();
       for (order_.push_back(root); at < order_.size(); ++at) {
         const int node = order_[at];
-        for (const auto& [neighbour, bits] : neighbours[node]) {
+        for (const auto& [neighbour, merge] : neighbours[node]) {
           if (is_known[neighbour]) continue;
           is_known[neighbour] = 1;
           parent_[neighbour] = node;
-          link_bits_[neighbour] = bits;
+          link_[neighbour] = merge;
+          link_bits_[neighbour] = merges[merge].information_bits;
           depth_[neighbour] = depth_[node] + 1;
           order_.push_back(neighbour);
         }
@@ -146,7 +168,8 @@ class CutTree {
   int nodes_;
   std::vector<int> order_;         ///< parents first
   std::vector<int> parent_;        ///< per node, or kNone
-  std::vector<double> link_bits_;  ///< per node, of the link to its parent
+  std::vector<int> link_;          ///< per node, to its parent, in the order of merges; or kNone
+  std::vector<double> link_bits_;  ///< per node, of that link
   std::vector<int> depth_;
   std::vector<char> is_cut_;  ///< per node, the link to its parent
   std::vector<int> meeting_;  ///< per edge
@@ -158,16 +181,16 @@ class CutTree {
 
 SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
                                const SubmapHierarchy& hierarchy, int submaps) {
-  SubmapPartition of_hierarchy = partitionIntoSubmaps(graph, hierarchy, submaps);
   const int features = static_cast<int>(hierarchy.ids.size());
-  if (of_hierarchy.submaps == features) return of_hierarchy;
+  SubmapPartition by_rounds = partitionIntoSubmaps(graph, hierarchy, submaps);
+  if (submaps >= features) return by_rounds;
 
   std::vector<WeightedEdge> edges = graphEdges(graph);
   double total_bits = 0.0;
   for (const WeightedEdge& edge : edges) total_bits += std::max(0.0, edge.weight);
   CutTree tree(std::move(edges), hierarchy);
   double least = features / (3.0 * submaps - 2.0);
-  while (tree.parts() < of_hierarchy.submaps) {
+  while (tree.parts() < submaps) {
     const Cut cut = tree.best(least);
     if (cut.node == kNone) {
       least /= 2.0;

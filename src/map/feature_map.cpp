@@ -36,9 +36,7 @@ const MapFeature* FeatureMap::find(FeatureId id) const {
   return it != features_.end() && it->id == id ? &*it : nullptr;
 }
 
-MapFeature* FeatureMap::findMutable(FeatureId id) {
-  return const_cast<MapFeature*>(find(id));
-}
+MapFeature* FeatureMap::findMutable(FeatureId id) { return const_cast<MapFeature*>(find(id)); }
 
 void FeatureMap::clear() { features_.clear(); }
 
@@ -144,6 +142,10 @@ void FeatureMap::learnSlope(const VisibleFeature& feature, const Template& expec
                             const cv::Mat& image, const Eigen::Vector2d& pixel) {
   if (MapFeature* known = findMutable(feature.id))
     active_matching_slam::learnSlope(image, pixel, expected, feature.view, &known->patch);
+}
+
+void FeatureMap::learnNoise(FeatureId id, const Eigen::Vector2d& residual_px, double shown_px) {
+  if (MapFeature* feature = findMutable(id)) feature->noise.learn(residual_px, shown_px);
 }
 
 double FeatureMap::expectedMatches(const std::vector<VisibleFeature>& visible) const {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/image/image_motion.h"
@@ -228,17 +229,19 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   result.statistics.matched = 0;
 }
 
-/// What the matches fused miss of the map as it is now [px], both coordinates of each.
-std::vector<double> Tracker::Implementation::residuals() const {
+/// Learns from what the matches fused miss of the map as it is now how noisy they are.
+void Tracker::Implementation::learnNoise() {
   const CameraModel lens = camera_.corrected(filter_.camera().lens);
-  std::vector<double> residuals;
+  std::vector<Eigen::Vector2d> residuals_px;
   for (const FeatureMeasurement& fused : fused_) {
     const auto projection = projectFeature(lens, filter_.camera(), *filter_.find(fused.id));
-    if (!projection) continue;
-    residuals.push_back(fused.pixel.x() - projection->pixel.x());
-    residuals.push_back(fused.pixel.y() - projection->pixel.y());
+    residuals_px.emplace_back(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+    if (projection) residuals_px.back() = fused.pixel - projection->pixel;
   }
-  return residuals;
+  const double shown_px = match_noise_.learn(options_.filter, residuals_px);
+  if (!(shown_px > 0.0)) return;
+  for (std::size_t i = 0; i < fused_.size(); ++i)
+    map_.learnNoise(fused_[i].id, residuals_px[i], shown_px);
 }
 
 /// Fuses the accepted matches, and learns from them.
@@ -259,13 +262,14 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
   }
   const Eigen::MatrixXd S = selectFeatures(prior_.S, matched);
   frame->match_sigma_px = match_noise_.sigma_px(options_.filter);
-  for (int k : agreeingMeasurements(innovation, S, kAgreementChi2))
-    fused_.push_back({prior_.ids[matched[k]],
-                      prior_.mean(matched[k]) + innovation.segment<2>(2 * k),
-                      frame->match_sigma_px});
+  for (int k : agreeingMeasurements(innovation, S, kAgreementChi2)) {
+    const FeatureId id = prior_.ids[matched[k]];
+    fused_.push_back({id, prior_.mean(matched[k]) + innovation.segment<2>(2 * k),
+                      match_noise_.sigma_px(options_.filter, map_.find(id)->noise)});
+  }
 
   const UpdateReport report = filter_.update(camera_, fused_);
-  match_noise_.learn(options_.filter, residuals());
+  learnNoise();
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 

@@ -9,10 +9,15 @@
 namespace active_matching_slam {
 namespace {
 
-std::vector<double> gaussian(double sigma, std::size_t count, std::mt19937* generator) {
+const Eigen::Vector2d not_a_number(std::numeric_limits<double>::quiet_NaN(), 0.0);
+
+std::vector<Eigen::Vector2d> gaussian(double sigma, std::size_t count, std::mt19937* generator) {
   std::normal_distribution<double> normal(0.0, sigma);
-  std::vector<double> values;
-  while (values.size() < count) values.push_back(normal(*generator));
+  std::vector<Eigen::Vector2d> values;
+  while (values.size() < count) {
+    const double x = normal(*generator);
+    values.emplace_back(x, normal(*generator));
+  }
   return values;
 }
 
@@ -21,15 +26,16 @@ double learntFrom(double sigma, double share_far_off, const FilterOptions& optio
   std::mt19937 generator(1);
   MatchNoise noise;
   for (int k = 0; k < 2000; ++k) {
-    std::vector<double> residuals = gaussian(sigma, 100, &generator);
-    for (std::size_t i = 0; i < 100 * share_far_off; ++i) residuals[i] = 5.0;
+    std::vector<Eigen::Vector2d> residuals = gaussian(sigma, 50, &generator);
+    for (std::size_t i = 0; i < 50 * share_far_off; ++i) residuals[i].setConstant(5.0);
     noise.learn(options, residuals);
   }
   return noise.sigma_px(options);
 }
 
 TEST(MatchNoise, IsInProportionToWhatUpdatesLeaveWhateverAFewMatchesSay) {
-  const FilterOptions options;
+  FilterOptions options;
+  options.minimum_sigma_px = 0.01;
   const double learnt = learntFrom(0.04, 0.0, options);
   EXPECT_GT(learnt, 0.04);
   EXPECT_LT(learnt, options.sigma_px);
@@ -50,7 +56,7 @@ TEST(MatchNoise, IsNotLearntInAHurry) {
   MatchNoise noise;
   EXPECT_EQ(noise.sigma_px(options), options.sigma_px);
   std::mt19937 generator(1);
-  for (int k = 0; k < 10; ++k) noise.learn(options, gaussian(0.05, 100, &generator));
+  for (int k = 0; k < 10; ++k) noise.learn(options, gaussian(0.05, 50, &generator));
   EXPECT_LT(noise.sigma_px(options), options.sigma_px);
   EXPECT_GT(noise.sigma_px(options), 0.8 * options.sigma_px);
   noise.reset();
@@ -61,11 +67,74 @@ TEST(MatchNoise, TooLittleOrWhatIsNotANumberTellsNothing) {
   FilterOptions options;
   MatchNoise noise;
   for (int k = 0; k < 2000; ++k) {
-    noise.learn(options, {});
-    noise.learn(options, std::vector<double>(15, 0.0));
-    noise.learn(options, std::vector<double>(20, std::numeric_limits<double>::quiet_NaN()));
+    EXPECT_EQ(noise.learn(options, {}), 0.0);
+    EXPECT_EQ(noise.learn(options, std::vector<Eigen::Vector2d>(7, Eigen::Vector2d::Zero())), 0.0);
+    EXPECT_EQ(noise.learn(options, std::vector<Eigen::Vector2d>(20, not_a_number)), 0.0);
   }
   EXPECT_EQ(noise.sigma_px(options), options.sigma_px);
+}
+
+TEST(MatchNoise, TellsWhatAFrameShows) {
+  std::mt19937 generator(1);
+  MatchNoise noise;
+  EXPECT_NEAR(noise.learn(FilterOptions(), gaussian(0.05, 4000, &generator)), 0.05, 0.002);
+}
+
+FeatureNoise learntFeature(double sigma, int matches, double shown_px) {
+  std::mt19937 generator(2);
+  FeatureNoise noise;
+  for (const Eigen::Vector2d& residual : gaussian(sigma, matches, &generator))
+    noise.learn(residual, shown_px);
+  return noise;
+}
+
+TEST(FeatureNoise, IsLikeThatOfOthersUntilThereIsEnoughToTell) {
+  EXPECT_EQ(FeatureNoise().factor(), 1.0);
+  const double first = learntFeature(0.15, 3, 0.05).factor();
+  EXPECT_GT(first, 1.0);
+  EXPECT_LT(first, 2.0);
+}
+
+TEST(FeatureNoise, IsLearntInTheUnitOfWhatFramesShow) {
+  EXPECT_NEAR(learntFeature(0.15, 500, 0.05).factor(), 3.0, 0.5);
+  EXPECT_NEAR(learntFeature(0.05, 500, 0.05).factor(), 1.0, 0.1);
+  EXPECT_LT(learntFeature(0.01, 500, 0.05).factor(), 0.6);
+}
+
+TEST(FeatureNoise, FollowsAFeatureThatChanges) {
+  FeatureNoise noise = learntFeature(0.2, 500, 0.05);
+  const double before = noise.factor();
+  std::mt19937 generator(3);
+  for (const Eigen::Vector2d& residual : gaussian(0.05, 500, &generator))
+    noise.learn(residual, 0.05);
+  EXPECT_LT(noise.factor(), 0.5 * before);
+}
+
+TEST(FeatureNoise, OneMatchFarOffDoesNotRuinAFeatureAndWhatIsNoNumberTellsNothing) {
+  FeatureNoise noise = learntFeature(0.05, 500, 0.05);
+  const double before = noise.factor();
+  noise.learn(not_a_number, 0.05);
+  EXPECT_EQ(noise.factor(), before);
+  noise.learn(Eigen::Vector2d(1e6, 0.0), 0.05);
+  EXPECT_LT(noise.factor(), 2.0 * before);
+}
+
+TEST(MatchNoise, OfAFeatureIsInProportionToItsOwnButNotBelowTheLeast) {
+  FilterOptions options;
+  options.minimum_sigma_px = 0.01;
+  std::mt19937 generator(1);
+  MatchNoise noise;
+  for (int k = 0; k < 500; ++k) noise.learn(options, gaussian(0.05, 50, &generator));
+  const double most = noise.sigma_px(options);
+  const FeatureNoise bad = learntFeature(0.5, 500, 0.05), good = learntFeature(0.01, 500, 0.05);
+  EXPECT_EQ(noise.sigma_px(options, FeatureNoise()), most);
+  EXPECT_DOUBLE_EQ(noise.sigma_px(options, bad), bad.factor() * most);
+  EXPECT_GT(noise.sigma_px(options, bad), options.sigma_px);
+  EXPECT_LT(noise.sigma_px(options, good), 0.6 * most);
+  options.minimum_sigma_px = most;
+  EXPECT_EQ(noise.sigma_px(options, good), most);
+  options.minimum_sigma_px = 2.0 * options.sigma_px;  // nothing is trusted more than that
+  EXPECT_EQ(noise.sigma_px(options, good), options.sigma_px);
 }
 
 }  // namespace

@@ -143,14 +143,43 @@ TEST(SubmapCut, AnEarlyLinkDoesNotBind) {
     EXPECT_EQ(two.submap_of_feature[i], i < kFirstFar ? 0 : 1) << i;
 }
 
-TEST(SubmapCut, ComesAsNearToTheNumberAsTheGraphAllows) {
+TEST(SubmapCut, GivesTheNumberAskedForWhetherTheGraphIsConnectedOrNot) {
   const Structure s(randomGraph(30, 2, 0.05));
   const int parts = s.hierarchy.levels.back().submaps;
-  ASSERT_GT(parts, 1);
-  EXPECT_EQ(s.cut(1).submaps, parts);
-  EXPECT_EQ(s.cut(parts + 3).submaps, parts + 3);
+  ASSERT_GT(parts, 2);
+  for (int submaps = 1; submaps <= 30; ++submaps) EXPECT_EQ(s.cut(submaps).submaps, submaps);
   EXPECT_EQ(s.cut(1000).submaps, 30);
   EXPECT_EQ(Structure(randomGraph(0, 0)).cut(3).submaps, 0);
+}
+
+/// Two rings without a link between them, the second with ids from 100 on.
+MutualInformationGraph twoRings(int first, int second) {
+  MutualInformationGraph graph;
+  const auto addRing = [&graph](int from, int features) {
+    for (int i = 0; i < features; ++i) {
+      graph.ids.push_back(from + i);
+      if (i + 1 < features)
+        graph.links.push_back({from + i, from + i + 1, 1.0 + 0.01 * i, 1, false});
+      if (i == 0) graph.links.push_back({from, from + features - 1, 0.5, 1, false});
+    }
+  };
+  addRing(0, first);
+  addRing(100, second);
+  return graph;
+}
+
+TEST(SubmapCut, PartsThatAreNotConnectedComeApartFirstAndLoseNothing) {
+  const SubmapPartition two = Structure(twoRings(12, 9)).cut(2);
+  EXPECT_EQ(two.preserved, 1.0);
+  for (int i = 0; i < 21; ++i) EXPECT_EQ(two.submap_of_feature[i], i < 12 ? 0 : 1) << i;
+}
+
+TEST(SubmapCut, AFeatureWithoutLinksIsNoSubmapButGoesWithItsNeighboursInTime) {
+  MutualInformationGraph graph = twoRings(12, 9);
+  graph.ids.insert(graph.ids.begin() + 12, {20, 95});  // next to the one and to the other
+  const SubmapPartition two = Structure(graph).cut(2);
+  EXPECT_EQ(two.preserved, 1.0);
+  for (int i = 0; i < 23; ++i) EXPECT_EQ(two.submap_of_feature[i], i < 13 ? 0 : 1) << i;
 }
 
 TEST(SubmapCut, SaysWhatIsWrong) {

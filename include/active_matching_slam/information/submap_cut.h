@@ -15,9 +15,10 @@ namespace active_matching_slam {
 /// partitions contain the levels and one another; but a cluster that took its strongest link in an
 /// early round is bound by it, however much a later one would hold together.
 ///
-/// Fewer submaps than the graph has connected parts, or more than it has features, can't be: the
-/// nearest possible number is returned. Throws std::invalid_argument as partitionIntoSubmaps()
-/// does. O(submaps (links + features submaps)) for each sweep of exchanges, of which there are few.
+/// Parts of the graph that are not connected are kept together by links without information, where
+/// one feature was initialised after the other: they come apart first, but what is too small for a
+/// submap of its own goes with its neighbours in time. No more submaps than features are returned.
+/// Throws std::invalid_argument as partitionIntoSubmaps() does. O(submaps (links + features submaps)) for each sweep of exchanges, of which there are few.
 SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
                                const SubmapHierarchy& hierarchy, int submaps);
 

@@ -75,7 +75,7 @@ struct TrackedFrame {
   CameraState camera;
   /// 12 x 12, CameraError order (world-frame additive position, world-frame rotation vector, ...).
   MotionCovariance camera_covariance = MotionCovariance::Zero();
-  double match_sigma_px = 0.0;  ///< noise per axis of the matches fused; 0: none were asked for
+  double match_sigma_px = 0.0;  ///< noise per axis of most matches; 0: none were asked for
   double nis = 0.0;
   int nis_degrees = 0;
 
