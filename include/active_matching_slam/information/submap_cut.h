@@ -18,7 +18,8 @@ namespace active_matching_slam {
 /// Parts of the graph that are not connected are kept together by links without information, where
 /// one feature was initialised after the other: they come apart first, but what is too small for a
 /// submap of its own goes with its neighbours in time. No more submaps than features are returned.
-/// Throws std::invalid_argument as partitionIntoSubmaps() does. O(submaps (links + features submaps)) for each sweep of exchanges, of which there are few.
+/// Throws std::invalid_argument as partitionIntoSubmaps() does. O(submaps (links + features
+/// submaps)) for each sweep of exchanges, of which there are few.
 SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
                                const SubmapHierarchy& hierarchy, int submaps);
 
