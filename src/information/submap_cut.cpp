@@ -147,12 +147,11 @@ class CutTree {
     }
   }
 
-  /// The lowest node above both ends. All links lie inside a connected part of the graph.
+  /// The lowest node above both ends.
   int meetingOf(const WeightedEdge& edge) const {
     int a = edge.first, b = edge.second;
     while (a != b) {
       int& deeper = depth_[a] >= depth_[b] ? a : b;
-      if (parent_[deeper] == kNone) return kNone;  // a link without information: no link
       deeper = parent_[deeper];
     }
     return a;
