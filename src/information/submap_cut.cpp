@@ -26,29 +26,29 @@ std::vector<SubmapMerge> connectedMerges(const SubmapHierarchy& hierarchy) {
   std::vector<SubmapMerge> merges = hierarchy.merges;
   DisjointSets sets(nodes);
   for (const SubmapMerge& merge : merges) sets.unite(merge.first, merge.second);
-  std::vector<int> followed;  // by a feature of another part
+  std::vector<WeightedEdge> joints;
   for (int i = 0; i + 1 < nodes; ++i)
-    if (sets.find(i) != sets.find(i + 1)) followed.push_back(i);
-  const auto gap = [&hierarchy](int i) { return hierarchy.ids[i + 1] - hierarchy.ids[i]; };
-  std::stable_sort(followed.begin(), followed.end(),
-                   [&gap](int a, int b) { return gap(a) < gap(b); });
-  for (const int i : followed)
-    if (sets.unite(i, i + 1)) merges.push_back({i, i + 1, 0.0, 0});
+    joints.push_back({i, i + 1, static_cast<double>(hierarchy.ids[i] - hierarchy.ids[i + 1])});
+  std::sort(joints.begin(), joints.end(), strongerEdge);
+  for (const WeightedEdge& joint : joints)
+    if (sets.unite(joint.first, joint.second))
+      merges.push_back({joint.first, joint.second, 0.0, 0});
   return merges;
 }
 
-/// The hierarchy's tree, each node under its parent, some links of which are cut.
+/// The hierarchy's tree, each node under its parent, some links of which are cut. Not empty.
 class CutTree {
  public:
   CutTree(std::vector<WeightedEdge> edges, const SubmapHierarchy& hierarchy)
-      : edges_(std::move(edges)), nodes_(static_cast<int>(hierarchy.ids.size())) {
-    grow(connectedMerges(hierarchy));
+      : edges_(std::move(edges)),
+        nodes_(static_cast<int>(hierarchy.ids.size())),
+        merges_(connectedMerges(hierarchy)) {
+    grow();
     for (const WeightedEdge& edge : edges_) meeting_.push_back(meetingOf(edge));
     label();
   }
 
   int parts() const { return parts_; }
-  bool hasLink(int node) const { return parent_[node] != kNone; }
   bool isCut(int node) const { return is_cut_[node] != 0; }
   double preserved() const { return preservedInformation(edges_, labels_, parts_); }
   void setCut(int node, bool is_cut) {
@@ -98,8 +98,8 @@ class CutTree {
       if (size[node] < least || whole[node] - size[node] < least) continue;
       // Of the links between the two sides the strongest stays, which is the one of the tree. To
       // other parts each side now has a strongest of its own: the weaker of them is won.
-      const double change =
-          link_bits_[node] - crossing[node] + strongest.col(node).cwiseMin(outside.col(node)).sum();
+      const double change = merges_[link_[node]].information_bits - crossing[node] +
+                            strongest.col(node).cwiseMin(outside.col(node)).sum();
       const bool wins_tie = change == best.change_bits && link_[node] > link_[best.node];
       if (change > best.change_bits || wins_tie) best = {node, change};
     }
@@ -116,33 +116,25 @@ class CutTree {
  private:
   bool isTop(int node) const { return parent_[node] == kNone || is_cut_[node] != 0; }
 
-  void grow(const std::vector<SubmapMerge>& merges) {
+  void grow() {
     std::vector<std::vector<std::pair<int, int>>> neighbours(nodes_);  // and the merge's index
-    for (int m = 0; m < static_cast<int>(merges.size()); ++m) {
-      neighbours[merges[m].first].emplace_back(merges[m].second, m);
-      neighbours[merges[m].second].emplace_back(merges[m].first, m);
+    for (int m = 0; m < static_cast<int>(merges_.size()); ++m) {
+      neighbours[merges_[m].first].emplace_back(merges_[m].second, m);
+      neighbours[merges_[m].second].emplace_back(merges_[m].first, m);
     }
     parent_.assign(nodes_, kNone);
     link_.assign(nodes_, kNone);
-    link_bits_.assign(nodes_, 0.0);
     depth_.assign(nodes_, 0);
     is_cut_.assign(nodes_, 0);
-    std::vector<char> is_known(nodes_, 0);
-    for (int root = 0; root < nodes_; ++root) {
-      if (is_known[root]) continue;
-      is_known[root] = 1;
-      std::size_t at = order_.size();
-      for (order_.push_back(root); at < order_.size(); ++at) {
-        const int node = order_[at];
-        for (const auto& [neighbour, merge] : neighbours[node]) {
-          if (is_known[neighbour]) continue;
-          is_known[neighbour] = 1;
-          parent_[neighbour] = node;
-          link_[neighbour] = merge;
-          link_bits_[neighbour] = merges[merge].information_bits;
-          depth_[neighbour] = depth_[node] + 1;
-          order_.push_back(neighbour);
-        }
+    order_.assign(1, 0);
+    for (std::size_t at = 0; at < order_.size(); ++at) {
+      const int node = order_[at];
+      for (const auto& [neighbour, merge] : neighbours[node]) {
+        if (neighbour == parent_[node]) continue;
+        parent_[neighbour] = node;
+        link_[neighbour] = merge;
+        depth_[neighbour] = depth_[node] + 1;
+        order_.push_back(neighbour);
       }
     }
   }
@@ -165,10 +157,10 @@ class CutTree {
 
   std::vector<WeightedEdge> edges_;
   int nodes_;
-  std::vector<int> order_;         ///< parents first
-  std::vector<int> parent_;        ///< per node, or kNone
-  std::vector<int> link_;          ///< per node, to its parent, in the order of merges; or kNone
-  std::vector<double> link_bits_;  ///< per node, of that link
+  std::vector<SubmapMerge> merges_;
+  std::vector<int> order_;   ///< parents first, from node 0 on
+  std::vector<int> parent_;  ///< per node; kNone of the first
+  std::vector<int> link_;    ///< per node, the merge with its parent; kNone of the first
   std::vector<int> depth_;
   std::vector<char> is_cut_;  ///< per node, the link to its parent
   std::vector<int> meeting_;  ///< per edge
@@ -181,7 +173,7 @@ class CutTree {
 SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
                                const SubmapHierarchy& hierarchy, int submaps) {
   const int features = static_cast<int>(hierarchy.ids.size());
-  SubmapPartition by_rounds = partitionIntoSubmaps(graph, hierarchy, submaps);
+  SubmapPartition by_rounds = partitionIntoSubmaps(graph, hierarchy, submaps);  // checks them
   if (submaps >= features) return by_rounds;
 
   std::vector<WeightedEdge> edges = graphEdges(graph);
@@ -202,7 +194,7 @@ SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
   for (int sweep = 0; sweep < kMostSweeps && has_gained; ++sweep) {
     has_gained = false;
     for (int node = 0; node < features; ++node) {
-      if (!tree.hasLink(node) || !tree.isCut(node)) continue;
+      if (!tree.isCut(node)) continue;
       tree.setCut(node, false);
       const Cut cut = tree.best(least);
       const bool gains = cut.node != kNone &&

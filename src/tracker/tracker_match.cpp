@@ -232,11 +232,12 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
 /// Learns from what the matches fused miss of the map as it is now how noisy they are.
 void Tracker::Implementation::learnNoise() {
   const CameraModel lens = camera_.corrected(filter_.camera().lens);
+  const Eigen::Vector2d unknown =
+      Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<Eigen::Vector2d> residuals_px;
   for (const FeatureMeasurement& fused : fused_) {
     const auto projection = projectFeature(lens, filter_.camera(), *filter_.find(fused.id));
-    residuals_px.emplace_back(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
-    if (projection) residuals_px.back() = fused.pixel - projection->pixel;
+    residuals_px.push_back(projection ? fused.pixel - projection->pixel : unknown);
   }
   const double shown_px = match_noise_.learn(options_.filter, residuals_px);
   if (!(shown_px > 0.0)) return;
