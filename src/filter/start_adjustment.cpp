@@ -18,7 +18,7 @@ constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to
 /// Share of the points: where most are as far as each other, the few that are near tell the motion.
 constexpr double kAllButNear = 0.75;
 /// Prior of depths in the end, by how far apart they turned out to be (median).
-constexpr double kDepthSpread = 2.0;
+constexpr double kDepthSpread = 3.5;
 constexpr std::size_t kMostImages = 40;     ///< kept
 constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
@@ -177,11 +177,7 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
   adjustBundle(model, *options, reading);
   // Corners where something near hides something far wander by less than would make them outliers;
   // most image points are much better than that.
-  const double equations = 2.0 * static_cast<double>(countPoints(*reading));
-  const double unknowns = 3.0 * static_cast<double>(ids->size()) +
-                          6.0 * static_cast<double>(reading->cameras.size() - 1);
-  const double freedom = std::max(equations - unknowns, 0.1 * equations);
-  const double scale = medianOf(featureErrors(model, *reading)) * std::sqrt(equations / freedom);
+  const double scale = noiseOf(model, *reading);
   options->outlier_px =
       std::clamp(kOutlierSigmas * scale, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
   options->sigma_px = options->outlier_px / kOutlierSigmas;

@@ -1,7 +1,12 @@
 #include "start_readings.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
 #include <vector>
+
+#include "active_matching_slam/filter/quantile.h"
 
 namespace active_matching_slam {
 namespace {
@@ -11,9 +16,11 @@ namespace {
 /// differ.
 constexpr double kDepthFreedom = 10.0;
 constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
-constexpr double kLeastCostGap = 12.0;     ///< to the next reading; odds of e^6
+constexpr double kHopelessCostGap = 12.0;  ///< by the noise assumed
+constexpr double kLeastCostGap = 6.0;      ///< by the images' own: to the next reading, odds of e^3
 constexpr double kMostCostPerPoint = 4.0;  ///< of 2 expected: beyond, things move or matches lie
-/// Of the assumed variance: images are credited with no less.
+constexpr double kLeastNoise_px = 0.04;    ///< by which matches are told from wrong ones
+/// Of the assumed variance: when readings are compared, images are credited with no less.
 constexpr double kLeastNoiseShare = 0.05;
 constexpr double kSameDirection = 0.8;  ///< cosine between two readings' moves that are one
 
@@ -79,6 +86,16 @@ std::size_t countPoints(const Bundle& bundle) {
   return points;
 }
 
+double noiseOf(const CameraModel& model, const Bundle& bundle) {
+  std::vector<double> errors_px = featureErrors(model, bundle);
+  errors_px.erase(std::remove(errors_px.begin(), errors_px.end(), 0.0), errors_px.end());
+  const double equations = 2.0 * static_cast<double>(countPoints(bundle));
+  const double unknowns = 3.0 * static_cast<double>(errors_px.size()) +
+                          6.0 * static_cast<double>(bundle.cameras.size() - 1);
+  const double freedom = std::max(equations - unknowns, 0.1 * equations);
+  return medianOf(std::move(errors_px)) * std::sqrt(equations / freedom);
+}
+
 std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions& options,
                                   const Bundle& believed) {
   std::vector<Bundle> readings(2, someImages(believed));
@@ -93,17 +110,23 @@ std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions&
       reverseDepths(model, &readings.back());
     }
     costs.push_back(adjustBundle(model, telling, &readings[i]));
-    telling.hopeless_cost = std::min(telling.hopeless_cost, costs.back() + kLeastCostGap);
+    telling.hopeless_cost = std::min(telling.hopeless_cost, costs.back() + kHopelessCostGap);
   }
-  const auto best =
-      static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-  // Images are often better than assumed.
-  const auto points = static_cast<double>(countPoints(readings[best]));
-  const double noise = std::clamp(costs[best] / (2.0 * points), kLeastNoiseShare, 1.0);
-  if (costs[best] > kMostCostPerPoint * points) return std::nullopt;
+  auto best = std::min_element(costs.begin(), costs.end()) - costs.begin();
+  if (costs[best] > kMostCostPerPoint * static_cast<double>(countPoints(readings[best])))
+    return std::nullopt;
+  // Images are often much better than assumed. By the noise assumed, one match that is wrong would
+  // then weigh as much as all that are right; by their own, it does not.
+  telling.sigma_px = std::clamp(noiseOf(model, readings[best]), kLeastNoise_px, options.sigma_px);
+  telling.outlier_px *= telling.sigma_px / options.sigma_px;
+  telling.hopeless_cost = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < costs.size(); ++i)
-    if (costs[i] < costs[best] + kLeastCostGap * noise &&
-        !isSameReading(readings[i], readings[best]))
+    costs[i] = adjustBundle(model, telling, &readings[i]);
+  best = std::min_element(costs.begin(), costs.end()) - costs.begin();
+  const double credited = kLeastNoiseShare * std::pow(options.sigma_px / telling.sigma_px, 2);
+  const double least_gap = kLeastCostGap * std::max(1.0, credited);
+  for (std::size_t i = 0; i < costs.size(); ++i)
+    if (costs[i] < costs[best] + least_gap && !isSameReading(readings[i], readings[best]))
       return std::nullopt;
   return allImages(readings[best], believed);
 }

@@ -15,4 +15,8 @@ std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions&
 /// Image points in all images.
 std::size_t countPoints(const Bundle& bundle);
 
+/// Standard deviation [px], per axis, of the image points as what they miss of the projections
+/// shows it, by the median over features, so that the few that are wrong don't count.
+double noiseOf(const CameraModel& model, const Bundle& bundle);
+
 }  // namespace active_matching_slam

@@ -202,6 +202,25 @@ TEST(StartAdjustment, AFeatureThatWandersIsLeftOut) {
   EXPECT_GT(adjusted->features.size(), truth.observations.front().size() / 2);
 }
 
+TEST(StartAdjustment, OneWrongMatchDoesNotMakeTheMoveAnother) {
+  constexpr int kRuns = 40, kLast = 4;
+  int adjusted_runs = 0;
+  for (unsigned seed = 1; seed <= kRuns; ++seed) {
+    SCOPED_TRACE(seed);
+    Bundle truth =
+        exampleBundle(CameraModel(exampleCalibration()), kLast + 1, 30, 0.0025, 0.03, seed, 0.5);
+    auto& last = truth.observations[kLast];
+    last[seed % last.size()].pixel += Eigen::Vector2d(2.0, -11.0);  // across the move
+    StartOfATrack start(truth);
+    const auto adjusted = start.adjustAfter(kLast);
+    if (!adjusted) continue;  // in doubt
+    ++adjusted_runs;
+    EXPECT_GT(cosineBetween(adjusted->camera.position_world, truth.cameras[kLast].position_world),
+              0.8);
+  }
+  EXPECT_GT(adjusted_runs, kRuns / 2);
+}
+
 TEST(StartAdjustment, AScaleThatIsSetMeanwhileHoldsForEarlierImagesToo) {
   const Bundle truth = track(12, 0.02, 6);
   StartOfATrack start(truth);
