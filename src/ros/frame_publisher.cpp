@@ -9,7 +9,9 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kPublisherQueueSize = 10;
+/// What a subscriber on a busy machine may leave unread, some seconds of a camera, and still miss
+/// nothing.
+constexpr int kPublisherQueueSize = 100;
 
 bool hasListener(const ros::Publisher& publisher) { return publisher.getNumSubscribers() > 0; }
 
