@@ -119,12 +119,14 @@ std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions&
   // then weigh as much as all that are right; by their own, it does not.
   telling.sigma_px = std::clamp(noiseOf(model, readings[best]), kLeastNoise_px, options.sigma_px);
   telling.outlier_px *= telling.sigma_px / options.sigma_px;
-  telling.hopeless_cost = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < costs.size(); ++i)
-    costs[i] = adjustBundle(model, telling, &readings[i]);
-  best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   const double credited = kLeastNoiseShare * std::pow(options.sigma_px / telling.sigma_px, 2);
   const double least_gap = kLeastCostGap * std::max(1.0, credited);
+  telling.hopeless_cost = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    costs[i] = adjustBundle(model, telling, &readings[i]);
+    telling.hopeless_cost = std::min(telling.hopeless_cost, costs[i] + least_gap);
+  }
+  best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   for (std::size_t i = 0; i < costs.size(); ++i)
     if (costs[i] < costs[best] + least_gap && !isSameReading(readings[i], readings[best]))
       return std::nullopt;
