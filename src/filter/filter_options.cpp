@@ -37,6 +37,7 @@ void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("sigma_angular_acceleration_rps2", options.sigma_angular_acceleration_rps2);
   checkPositive("sigma_px", options.sigma_px);
   checkPositive("minimum_sigma_px", options.minimum_sigma_px);
+  checkNotNegative("corner_wander_px", options.corner_wander_px);
   checkNotNegative("initial_sigma_velocity_mps", options.initial_sigma_velocity_mps);
   checkNotNegative("initial_sigma_angular_velocity_rps",
                    options.initial_sigma_angular_velocity_rps);

@@ -50,7 +50,9 @@ void Tracker::Implementation::predict(double interval_s) {
   } else {
     filter_.doubtVelocity(kSlowingUnseen);
   }
-  filter_.predict(std::min(interval_s, options_.max_frame_interval_s));
+  interval_s = std::min(interval_s, options_.max_frame_interval_s);
+  filter_.predict(interval_s);
+  filter_.letCornersWander(camera_, interval_s);
 }
 
 /// Predicts what should be seen and prepares the search for it.

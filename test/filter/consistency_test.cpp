@@ -69,6 +69,19 @@ TEST(Consistency, PoseErrorsMatchTheirCovarianceForSharpMeasurements) {
   EXPECT_GE(run(options).frames_within, 0.9);
 }
 
+TEST(Consistency, PoseErrorsMatchTheirCovarianceWhereCornersWander) {
+  SimulationOptions options = baseOptions();
+  options.sigma_px = 0.3;
+  options.wander_px = 1.0;
+  options.filter.corner_wander_px = 1.0;
+  const MonteCarloResult allowed_for = run(options);
+  EXPECT_GE(allowed_for.frames_within, 0.9);
+  options.filter.corner_wander_px = 0.0;
+  const MonteCarloResult taken_for_fixed = run(options);
+  EXPECT_GT(taken_for_fixed.frames_above, 0.5);
+  EXPECT_LT(allowed_for.rms_position_m, taken_for_fixed.rms_position_m);
+}
+
 TEST(Consistency, AtALowFrameRateTheFilterIsNotOverconfident) {
   SimulationOptions options = baseOptions();
   options.rate_hz = 7.5;

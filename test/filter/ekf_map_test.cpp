@@ -56,13 +56,55 @@ TEST_F(EkfMap, PredictionEqualsThePlainFormulaWithANumericalJacobian) {
 }
 
 TEST_F(EkfMap, PredictionOverNoTimeOrNonsenseChangesNothing) {
-  const Ekf before = exampleFilter(model_, 2);
+  Ekf before = exampleFilter(model_, 2);
+  FilterOptions options = exampleOptions();
+  options.corner_wander_px = 1.0;
+  before.setOptions(options);
   for (const double dt : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     Ekf filter = before;
     filter.predict(dt);
+    filter.letCornersWander(model_, dt);
     EXPECT_EQ(filter.covariance(), before.covariance());
     EXPECT_EQ(filter.camera().position_world, before.camera().position_world);
   }
+}
+
+TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
+  Ekf filter = exampleFilter(model_, 3);
+  filter.addPointFeature(filter.camera().poseWorldCamera() * Eigen::Vector3d(0.3, -0.2, 1.5),
+                         1e-4 * Eigen::Matrix3d::Identity());
+  FilterOptions options = exampleOptions();
+  options.corner_wander_px = 2.0;
+  filter.setOptions(options);
+  const double dt = 1e-4;
+  const Eigen::MatrixXd before = filter.covariance();
+  filter.letCornersWander(model_, dt);
+  Eigen::MatrixXd growth = filter.covariance() - before;
+  const Eigen::Vector3d here = filter.camera().position_world;
+  const Eigen::Vector3d there = here - dt * filter.camera().velocity_world;
+  int points = 0, rays = 0;
+  for (const FeatureState& feature : filter.features()) {
+    const Eigen::Vector3d ray = (feature.position() - here).normalized();
+    const double turned_rad = ray.cross((feature.position() - there).normalized()).norm();
+    const double variance = 4.0 * turned_rad / std::pow(model_.calibration().fx, 2);  // rad^2
+    auto own = growth.block(feature.offset, feature.offset, feature.size(), feature.size());
+    if (feature.kind == FeatureKind::kPoint) {
+      ++points;
+      own /= (feature.position() - here).squaredNorm();
+      EXPECT_LT((own * ray).norm(), 1e-6 * variance);
+      EXPECT_NEAR(own.trace(), 2.0 * variance, 1e-3 * variance);
+    } else {
+      ++rays;
+      EXPECT_NEAR(own(3, 3), variance, 1e-3 * variance);
+      EXPECT_NEAR(own(4, 4), variance, 1e-3 * variance);
+      own.block<2, 2>(3, 3).diagonal().setZero();
+      EXPECT_TRUE(own.isZero(0.0));
+    }
+    own.setZero();
+  }
+  EXPECT_TRUE(growth.isZero(0.0)) << "the rest";
+  EXPECT_GT(points, 0);
+  EXPECT_GT(rays, 0);
 }
 
 TEST_F(EkfMap, ANewFeatureIsPredictedWhereItWasSeenWhateverItsDepth) {

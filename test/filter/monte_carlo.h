@@ -29,6 +29,7 @@ struct SimulationOptions {
   double speed = 1.0;          ///< of the hand
   /// Depths of new points: from the filter's prior, or all points on a wall at this distance [m].
   double wall_m = 0.0;
+  double wander_px = 0.0;  ///< by which points move across the ray, per root of a radian of view
 };
 
 struct SimulatedFrame {
@@ -58,8 +59,11 @@ class Simulation {
 
   SimulatedFrame step() {
     const double dt = 1.0 / options_.rate_hz;
+    const Eigen::Vector3d before = truth_.position_world;
     move(dt);
+    wander(before);
     filter_.predict(dt);
+    filter_.letCornersWander(model_, dt);
     std::vector<FeatureMeasurement> measurements;
     for (const FeatureState& feature : filter_.features()) {
       const auto pixel = seen(points_.at(feature.id));
@@ -160,6 +164,17 @@ class Simulation {
     truth_.position_world += dt * truth_.velocity_world;
     truth_.q_world_camera =
         truth_.q_world_camera * rotationFromVector(dt * truth_.angular_velocity_camera);
+  }
+
+  void wander(const Eigen::Vector3d& before) {
+    if (options_.wander_px == 0.0) return;
+    for (auto& [id, point] : points_) {
+      const Eigen::Vector3d from = point - before, to = point - truth_.position_world;
+      const double turned_rad = std::acos(std::min(1.0, from.normalized().dot(to.normalized())));
+      const double sigma_m =
+          options_.wander_px / model_.calibration().fx * std::sqrt(turned_rad) * to.norm();
+      point += to.normalized().cross(random_.vector(sigma_m));
+    }
   }
 
   void start() {

@@ -57,6 +57,11 @@ void visitOptions(Options& o, Visitor&& visit) {
   visit(F{"filter/minimum_sigma_px",
           "updates trust matches that show less noise, down to this; sigma_px: never [px]", true},
         o.filter.minimum_sigma_px, 0.01, 20.0);
+  visit(F{"filter/corner_wander_px",
+          "by how much a corner moves in its patch as the view of it turns, per axis and root of a "
+          "radian [px]",
+          true},
+        o.filter.corner_wander_px, 0.0, 20.0);
   visit(F{"filter/initial_sigma_velocity_mps", "at start, per axis [m/s]", true},
         o.filter.initial_sigma_velocity_mps, 1e-3, 100.0);
   visit(F{"filter/initial_sigma_angular_velocity_rps", "at start, per axis [rad/s]", true},
