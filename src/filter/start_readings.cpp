@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -78,13 +79,14 @@ void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle) {
   }
 }
 
-}  // namespace
-
+/// Image points in all images.
 std::size_t countPoints(const Bundle& bundle) {
   std::size_t points = 0;
   for (const auto& observations : bundle.observations) points += observations.size();
   return points;
 }
+
+}  // namespace
 
 double noiseOf(const CameraModel& model, const Bundle& bundle) {
   std::vector<double> errors_px = featureErrors(model, bundle);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <optional>
 
 #include "active_matching_slam/filter/bundle_adjustment.h"
@@ -11,9 +10,6 @@ namespace active_matching_slam {
 /// only turned, or one of these with near and far exchanged. Empty when in doubt.
 std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions& options,
                                   const Bundle& believed);
-
-/// Image points in all images.
-std::size_t countPoints(const Bundle& bundle);
 
 /// Standard deviation [px], per axis, of the image points as what they miss of the projections
 /// shows it, by the median over features, so that the few that are wrong don't count.
