@@ -96,7 +96,10 @@ Motion::Components components(const std::string& name, const Stage& stage, Rando
     addHand(c, 0.01 * size, 0.012, 0.3, 2.0, random);
   } else if (name == "sweep") {
     addThereAndBack(c[kZ], farther(stage.reach_min_m.z(), stage.reach_max_m.z()), 0.2 * size);
-    c[kYaw].add(70.0 * kDegree, 2.0 * M_PI / 7.0, 0.0);
+    // 80 degrees sin(rate t) sin(growth t): farther to either side each time, then less far again.
+    const double rate = 2.0 * M_PI / 4.0, growth = 2.0 * M_PI / 34.0;
+    c[kYaw].add(40.0 * kDegree, rate - growth, 0.5 * M_PI);
+    c[kYaw].add(40.0 * kDegree, rate + growth, -0.5 * M_PI);
     addHand(c, 0.01 * size, 0.012, 0.3, 2.0, random);
   } else if (name == "circle") {
     const double rate = 2.0 * M_PI / 6.0, radius = 0.3 * size;
@@ -180,7 +183,7 @@ const std::vector<NamedChoice>& motionChoices() {
       {"jerky", "hasty hand: turns and jerks up to about 1.5 rad/s"},
       {"sideways", "steady move to the side and back"},
       {"forward", "steady move ahead and back"},
-      {"sweep", "slow move ahead and back, looking from one side to the other"},
+      {"sweep", "slow move ahead and back, looking ever farther to one side and the other"},
       {"circle", "a circle every 6 s, looking at its middle"},
       {"still", "a camera that does not move"},
       {"shake", "vibration at 2 to 4 Hz in one place"},

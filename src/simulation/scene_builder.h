@@ -103,6 +103,7 @@ Scene makeDesk(std::uint64_t seed);
 Scene makeCheckerboard(std::uint64_t seed);
 Scene makeTwoDepths(std::uint64_t seed);
 Scene makeCorridor(std::uint64_t seed);
+Scene makeCorridorEnd(std::uint64_t seed);
 Scene makeWall(std::uint64_t seed);
 Scene makeWalkway(std::uint64_t seed);
 

@@ -13,6 +13,7 @@ const std::vector<NamedChoice>& sceneChoices() {
       {"checkerboard", "a checkerboard on the floor: the same corner over and over"},
       {"two_depths", "a table with boxes in front of a wall far behind"},
       {"corridor", "two long walls with posters and doors"},
+      {"corridor_end", "two walls with posters, nothing on the wall ahead"},
       {"wall", "one long wall, for moving sideways"},
   };
   return choices;
@@ -27,6 +28,7 @@ Scene createScene(const std::string& name, std::uint64_t seed) {
   if (name == "checkerboard") return makeCheckerboard(seed);
   if (name == "two_depths") return makeTwoDepths(seed);
   if (name == "corridor") return makeCorridor(seed);
+  if (name == "corridor_end") return makeCorridorEnd(seed);
   return makeWall(seed);
 }
 

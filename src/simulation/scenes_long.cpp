@@ -35,6 +35,33 @@ Scene makeCorridor(std::uint64_t seed) {
   return b.finish();
 }
 
+Scene makeCorridorEnd(std::uint64_t seed) {
+  SceneBuilder b("corridor_end", seed);
+  constexpr double kEnd = 3.4, kHalfWidth = 1.2;
+  b.scene().ambient = 0.7;
+  b.scene().light_grid_m = 0.2;
+  b.density(160);
+  b.room({-kHalfWidth, -6.0, 0.0}, {kHalfWidth, kEnd, 2.6},
+         [](const Canvas& c) { return paintTiles(c, 0.4, 0.42); }, plaster(0.8),
+         {plaster(0.7), plaster(0.66), plaster(0.66), plaster(0.66)});
+  b.density(400);
+  for (const double side : {-1.0, 1.0}) {
+    for (int i = 0; i < 5; ++i) {
+      for (int row = 0; row < 3; ++row) {
+        const Paint paint = b.random().uniform() < 0.7 ? Paint(paintPoster) : Paint(paintCorkBoard);
+        const double y = -0.8 + 0.75 * i + b.random().uniform(-0.05, 0.05);
+        const double z = 0.75 + 0.65 * row + b.random().uniform(-0.05, 0.05);
+        const double width = b.random().uniform(0.45, 0.62);
+        b.upright({side * (kHalfWidth - 0.005), y, z}, side > 0.0 ? M_PI : 0.0, width,
+                  b.random().uniform(0.4, 0.52), paint);
+      }
+    }
+  }
+  for (const double y : {-2.0, 0.5}) b.lamp({0, y, 2.55}, 0.6, 1.1);
+  b.start({0.0, 0.0, 1.5}, 0.5 * M_PI, 0.0, {-0.5, -0.3, -0.4}, {0.5, 0.3, 0.8}, 1.0);
+  return b.finish();
+}
+
 Scene makeWall(std::uint64_t seed) {
   SceneBuilder b("wall", seed);
   b.scene().ambient = 0.8;

@@ -51,10 +51,10 @@ TEST_P(EveryScene, IsLitAndLeavesRoomToMove) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("room", "office", "walkway", "desk", "checkerboard",
-                                           "two_depths", "corridor", "wall"),
+                                           "two_depths", "corridor", "corridor_end", "wall"),
                          [](const auto& info) { return info.param; });
 
-TEST(Scenes, EveryListedNameIsTested) { EXPECT_EQ(sceneChoices().size(), 8u); }
+TEST(Scenes, EveryListedNameIsTested) { EXPECT_EQ(sceneChoices().size(), 9u); }
 
 TEST(Scenes, AnUnknownNameIsRefusedWithTheList) {
   try {
@@ -63,7 +63,7 @@ TEST(Scenes, AnUnknownNameIsRefusedWithTheList) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
                  "scene is 'moon', must be one of room, office, walkway, desk, checkerboard, "
-                 "two_depths, corridor, wall");
+                 "two_depths, corridor, corridor_end, wall");
   }
 }
 
