@@ -30,7 +30,7 @@ if(CATKIN_ENABLE_TESTING)
   target_include_directories(test_tools SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
   target_compile_definitions(test_tools PRIVATE TRACK_BAG="$<TARGET_FILE:track_bag>"
     IMAGES_TO_BAG="$<TARGET_FILE:images_to_bag>" CHECK_VECTORS="$<TARGET_FILE:check_vectors>"
-    REPRODUCE="$<TARGET_FILE:reproduce>")
+    REPRODUCE="$<TARGET_FILE:reproduce>" CONSISTENCY="$<TARGET_FILE:consistency>")
   target_link_libraries(test_tools ams_tools gtest_main)
-  add_dependencies(test_tools track_bag images_to_bag check_vectors reproduce)
+  add_dependencies(test_tools track_bag images_to_bag check_vectors reproduce consistency)
 endif()

@@ -290,7 +290,8 @@ RECIPES = [
     r'scripts/(build|test|demo|images_to_bag)( && source build/release/devel/setup\.bash| --help)?',
     r'scripts/test --.*', r'rosbag play --clock', r'rostopic (list|echo)',
     # Hours of work; tried in small in test/tools/reproduce_test.cpp.
-    r'rosrun %s reproduce .*' % PACKAGE, r'rosrun %s reliability' % PACKAGE, r'scripts/update_.*',
+    r'rosrun %s reproduce .*' % PACKAGE, r'rosrun %s reliability' % PACKAGE,
+    r'rosrun %s consistency' % PACKAGE, r'scripts/update_.*',
     # Run in machines_test.py.
     r'export ROS_.*', r'ping .*',
     # For people with a board in the hand, another computer, or a screen.
