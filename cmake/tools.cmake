@@ -26,7 +26,7 @@ if(CATKIN_ENABLE_TESTING)
   file(GLOB tool_tests CONFIGURE_DEPENDS test/tools/*_test.cpp)
   catkin_add_gtest(test_tools ${tool_tests}
     WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/test)
-  target_include_directories(test_tools PRIVATE src)
+  target_include_directories(test_tools PRIVATE src test)
   target_include_directories(test_tools SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
   target_compile_definitions(test_tools PRIVATE TRACK_BAG="$<TARGET_FILE:track_bag>"
     IMAGES_TO_BAG="$<TARGET_FILE:images_to_bag>" CHECK_VECTORS="$<TARGET_FILE:check_vectors>"

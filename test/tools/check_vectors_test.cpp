@@ -1,28 +1,18 @@
 // Runs the executable (its path is compiled in as CHECK_VECTORS) on a folder of its own making.
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "support/run_program.h"
+
 namespace {
 
-struct Outcome {
-  int status = -1;
-  std::string output;  ///< stdout and stderr
-};
-
-Outcome run(const std::string& arguments) {
-  Outcome outcome;
-  FILE* pipe = popen((std::string(CHECK_VECTORS) + " " + arguments + " 2>&1").c_str(), "r");
-  char buffer[256];
-  while (pipe && std::fgets(buffer, sizeof buffer, pipe)) outcome.output += buffer;
-  outcome.status = WEXITSTATUS(pclose(pipe));
-  return outcome;
+active_matching_slam::ProgramOutcome run(const std::string& arguments) {
+  return active_matching_slam::runProgram(CHECK_VECTORS, arguments);
 }
 
 class CheckVectors : public testing::Test {
@@ -48,7 +38,7 @@ class CheckVectors : public testing::Test {
 TEST_F(CheckVectors, PrintsALineForEachAndTheCountsLast) {
   write("a.json", 0);
   write("b.json", -1);
-  const Outcome outcome = run(folder_.string());
+  const active_matching_slam::ProgramOutcome outcome = run(folder_.string());
   EXPECT_EQ(1, outcome.status);
   EXPECT_EQ(
       "passed  a  (1 values compared)\n"

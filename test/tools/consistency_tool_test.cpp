@@ -1,21 +1,20 @@
 // Runs the executable (its path is compiled in as CONSISTENCY) on two short runs.
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "support/run_program.h"
+
 namespace {
 
 int runConsistency(const std::string& arguments, std::string* output) {
-  FILE* pipe = popen((std::string(CONSISTENCY) + " " + arguments + " 2>&1").c_str(), "r");
-  char buffer[256];
-  while (pipe && std::fgets(buffer, sizeof buffer, pipe)) *output += buffer;
-  return WEXITSTATUS(pclose(pipe));
+  const auto outcome = active_matching_slam::runProgram(CONSISTENCY, arguments);
+  *output = outcome.output;
+  return outcome.status;
 }
 
 TEST(ConsistencyTool, PrintsATableAndWritesARowForEachFrame) {
@@ -46,7 +45,6 @@ TEST(ConsistencyTool, SaysWhatIsOutOfRange) {
   std::string output;
   EXPECT_EQ(runConsistency("--runs 0", &output), 2);
   EXPECT_NE(output.find("--runs must be 1 to 1000"), std::string::npos) << output;
-  output.clear();
   EXPECT_EQ(runConsistency("--scene nowhere", &output), 2);
   EXPECT_NE(output.find("nowhere"), std::string::npos) << output;
 }
