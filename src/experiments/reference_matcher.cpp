@@ -129,7 +129,8 @@ std::vector<Eigen::Vector2d> ReferenceMatcher::match(int image, const std::vecto
         peak.x == 0 || peak.y == 0 || peak.x == 2 * kWindowPx || peak.y == 2 * kWindowPx;
     if (best < kLeastScore || at_rim) continue;
     const Eigen::Vector2d whole(u - kWindowPx + peak.x, v - kWindowPx + peak.y);
-    places[i] = refineSubpixel(picture, templates[i], whole).value_or(whole);
+    const auto fit = refineSubpixel(picture, templates[i], whole);
+    places[i] = fit ? fit->pixel : whole;
   }
   return places;
 }

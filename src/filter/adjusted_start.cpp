@@ -10,8 +10,8 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kScaleSigma = 1e-3;    ///< of the free unit, relative
-constexpr double kClearlyBetter = 0.7;  ///< of standard deviations
+constexpr double kScaleSigma = 1e-3;     ///< of the free unit, relative
+constexpr double kClearlyBetter = 0.35;  ///< of standard deviations
 
 /// Relative standard deviation of the distance from the world's origin, median.
 double depthSigma(const Ekf& filter, const std::vector<FeatureState>& features) {

@@ -47,7 +47,7 @@ double robustCost(const BundleOptions& options, double squared) {
   return limit * std::log1p(squared / limit) / (options.sigma_px * options.sigma_px);
 }
 
-/// Information [1/px^2] of an image point with that residual.
+/// Information [1/px^2] of an image point like most with that residual.
 double robustInformation(const BundleOptions& options, double squared) {
   return 1.0 / (options.sigma_px * options.sigma_px) /
          (1.0 + squared / (options.outlier_px * options.outlier_px));
@@ -56,6 +56,11 @@ double robustInformation(const BundleOptions& options, double squared) {
 /// Where a point would be seen by the calibration as given.
 Eigen::Vector2d plainPixel(const Bundle& bundle, const BundleObservation& o) {
   return o.pixel - o.d_calibration * bundle.calibration;
+}
+
+/// Of a residual [px], squared, as if the point were as noisy as most.
+double squaredMiss(const BundleObservation& o, const Eigen::Vector2d& residual_px) {
+  return residual_px.squaredNorm() / (o.noise * o.noise);
 }
 
 CalibrationVector calibrationInformation(const BundleOptions& options) {
@@ -81,7 +86,7 @@ double bundleCost(const CameraModel& model, const BundleOptions& options, const 
       const FeatureState& feature = bundle.features[o.feature];
       const auto pixel = model.project(
           R_camera_world * (feature.bearing_world - feature.inverse_depth * camera.position_world));
-      cost += pixel ? robustCost(options, (plainPixel(bundle, o) - *pixel).squaredNorm())
+      cost += pixel ? robustCost(options, squaredMiss(o, plainPixel(bundle, o) - *pixel))
                     : kCostOfInvisible;
     }
   }
@@ -125,8 +130,9 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
         continue;
       }
       const Eigen::Vector2d residual = plainPixel(bundle, o) - projection->pixel;
-      const double weight = robustInformation(options, residual.squaredNorm());
-      N.cost += robustCost(options, residual.squaredNorm());
+      const double squared = squaredMiss(o, residual);
+      const double weight = robustInformation(options, squared) / (o.noise * o.noise);
+      N.cost += robustCost(options, squared);
       const Matrix23 J = projection->d_feature.rightCols<3>(), weighted_J = weight * J;
       N.features[o.feature].noalias() += J.transpose() * weighted_J;
       N.feature_gradient.segment<3>(3 * o.feature) += weighted_J.transpose() * residual;
@@ -340,7 +346,7 @@ std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle
       const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
                                               bundle.features[o.feature], &d_pose);
       if (!projection) continue;
-      squares[o.feature] += 0.5 * (plainPixel(bundle, o) - projection->pixel).squaredNorm();
+      squares[o.feature] += 0.5 * squaredMiss(o, plainPixel(bundle, o) - projection->pixel);
       counts[o.feature] += 1.0;
     }
   }

@@ -50,7 +50,8 @@ void Ekf::assignOffsets() {
 }
 
 FeatureId Ekf::addInverseDepthFeature(const CameraModel& camera, const Eigen::Vector2d& pixel,
-                                      double inverse_depth, double sigma_inverse_depth) {
+                                      double inverse_depth, double sigma_inverse_depth,
+                                      double sigma_px) {
   if (!pixel.allFinite()) return -1;
   Eigen::Matrix<double, 3, 2> d_bearing_d_pixel;
   const CameraModel lens = camera.corrected(camera_.lens);
@@ -68,6 +69,8 @@ FeatureId Ekf::addInverseDepthFeature(const CameraModel& camera, const Eigen::Ve
   feature.inverse_depth = inverse_depth > 0.0 ? inverse_depth : options_.initial_inverse_depth;
   const double sigma_rho =
       sigma_inverse_depth > 0.0 ? sigma_inverse_depth : options_.initial_sigma_inverse_depth;
+
+  if (!(sigma_px > 0.0)) sigma_px = options_.sigma_px;
 
   // The anchor is the camera's place, the bearing turns with the camera and goes with the lens;
   // only the pixel's noise and the depth are new.
@@ -91,7 +94,7 @@ FeatureId Ekf::addInverseDepthFeature(const CameraModel& camera, const Eigen::Ve
   const double row_s = camera_.readout_s / camera.height();
   B.col(1).head<3>() += row_s * row.speed.head<3>();
   B.col(1).segment<2>(FeatureError::kBearing) += row_s * N * row.speed.tail<3>();
-  P.block<6, 6>(o, o) += options_.sigma_px * options_.sigma_px * B * B.transpose();
+  P.block<6, 6>(o, o) += sigma_px * sigma_px * B * B.transpose();
   P(o + FeatureError::kInverseDepth, o + FeatureError::kInverseDepth) += sigma_rho * sigma_rho;
   const Eigen::Matrix<double, 6, 6> own = P.block<6, 6>(o, o);
   P.block<6, 6>(o, o) = 0.5 * (own + own.transpose());

@@ -41,12 +41,16 @@ UpdateReport Ekf::update(const CameraModel& camera,
   UpdateReport report;
   const CameraModel lens = camera.corrected(camera_.lens);
   std::vector<UsableMeasurement> usable;
-  for (const FeatureMeasurement& m : measurements) {
+  std::vector<std::size_t> given;  // places of those in `measurements`
+  report.noise_left.assign(measurements.size(), 0.0);
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    const FeatureMeasurement& m = measurements[i];
     const int index = indexOf(m.id);
     if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px)) continue;
     if (!projectFeature(lens, camera_, features_[index])) continue;
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
     usable.push_back({index, m.pixel, sigma_px * sigma_px});
+    given.push_back(i);
   }
   report.skipped = static_cast<int>(measurements.size() - usable.size());
   if (usable.empty()) return report;
@@ -61,6 +65,8 @@ UpdateReport Ekf::update(const CameraModel& camera,
     report.healthy = false;
     return report;
   }
+  const std::vector<double> noise_left = correction.noiseLeft();
+  for (std::size_t i = 0; i < given.size(); ++i) report.noise_left[given[i]] = noise_left[i];
   correction.finish();
   camera_ = correction.camera();
   features_ = correction.features();

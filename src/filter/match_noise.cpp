@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "active_matching_slam/filter/quantile.h"
@@ -11,21 +12,25 @@ namespace active_matching_slam {
 namespace {
 
 constexpr std::size_t kLeastMatches = 8;
-constexpr double kWeight = 0.02;  ///< of one update in the average
-/// What wanders with the view, each corner in its own way, is taken for the map's: it shows little
-/// in what is left, and does not average out. As white noise it weighs so much more than what
-/// shows. (By NEES over rendered runs.)
-constexpr double kUnseen = 2.7;
+constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once there are many
+/// What a patch is off in its own way, in what images tell of it, and the motion of the image after
+/// which it is another: it is weighed as white noise of so many times the variance as images show
+/// the same. (By NEES over rendered runs.)
+constexpr double kUnseen = 0.9;
+constexpr double kFreshPx = 2.0;
+constexpr double kMostRepetitions = 30.0;
+/// Power of what images tell by which corners wander more. (By the same.)
+constexpr double kWanderByMisfit = 2.0;
 constexpr double kSigmaByMedian = 1.4826;  ///< of a Gaussian's absolute values
 
+constexpr double kSightWeight = 0.1;  ///< of one match in a feature's average, once there are many
 constexpr double kMemory = 0.99;      ///< of a feature's noise, a match
 constexpr double kLikeOthers = 20.0;  ///< matches for which a feature is taken to be like others
 constexpr double kMostSigmas = 10.0;  ///< that one match says
 
 }  // namespace
 
-double MatchNoise::learn(const FilterOptions& options,
-                         const std::vector<Eigen::Vector2d>& residuals_px) {
+double MatchNoise::learn(const std::vector<Eigen::Vector2d>& residuals_px) {
   std::vector<double> sizes_px;
   for (const Eigen::Vector2d& residual : residuals_px) {
     if (!residual.allFinite()) continue;
@@ -34,20 +39,49 @@ double MatchNoise::learn(const FilterOptions& options,
   }
   if (sizes_px.size() < 2 * kLeastMatches) return 0.0;
   const double shown_px = kSigmaByMedian * medianOf(std::move(sizes_px));
-  const double before_px2 = variance_px2_.value_or(options.sigma_px * options.sigma_px);
-  variance_px2_ = before_px2 + kWeight * (kUnseen * kUnseen * shown_px * shown_px - before_px2);
+  const double weight = std::max(kLeastWeight, 1.0 / ++updates_);
+  shown_px2_ += weight * (shown_px * shown_px - shown_px2_);
   return shown_px;
 }
 
+void MatchNoise::seeMotion(std::vector<double> motions_px) {
+  const double motion_px = motions_px.size() < kLeastMatches
+                               ? std::numeric_limits<double>::infinity()
+                               : medianOf(std::move(motions_px));
+  repetitions_ = kFreshPx < kMostRepetitions * motion_px ? std::max(1.0, kFreshPx / motion_px)
+                                                         : kMostRepetitions;
+}
+
+void MatchNoise::see(std::vector<double> sigmas_px) {
+  if (sigmas_px.size() < kLeastMatches) return;
+  const double now_px = medianOf(std::move(sigmas_px));
+  seen_px_ += (seen_px_ > 0.0 ? kLeastWeight : 1.0) * (now_px - seen_px_);
+}
+
+double MatchNoise::likeMost(const FeatureNoise& feature) const {
+  if (!(feature.seen_px() > 0.0) || !(seen_px_ > 0.0)) return 1.0;
+  return std::pow(feature.seen_px() / seen_px_, kWanderByMisfit);
+}
+
 double MatchNoise::sigma_px(const FilterOptions& options) const {
-  if (!variance_px2_) return options.sigma_px;
-  return std::min(options.sigma_px, std::max(options.minimum_sigma_px, std::sqrt(*variance_px2_)));
+  if (updates_ == 0) return options.sigma_px;
+  const double sigma_px =
+      std::sqrt(shown_px2_ + repetitions_ * kUnseen * kUnseen * seen_px_ * seen_px_);
+  return std::min(options.sigma_px, std::max(options.minimum_sigma_px, sigma_px));
 }
 
 double MatchNoise::sigma_px(const FilterOptions& options, const FeatureNoise& feature) const {
   return std::max(std::min(options.sigma_px, options.minimum_sigma_px),
-                  feature.factor() * sigma_px(options));
+                  feature.factor() * likeMost(feature) * sigma_px(options));
 }
+
+void FeatureNoise::see(double sigma_px) {
+  if (!(sigma_px > 0.0)) return;
+  const double weight = std::max(kSightWeight, 1.0 / ++seen_);
+  seen_px2_ += weight * (sigma_px * sigma_px - seen_px2_);
+}
+
+double FeatureNoise::seen_px() const { return std::sqrt(seen_px2_); }
 
 void FeatureNoise::learn(const Eigen::Vector2d& residual_px, double shown_px) {
   const double squared = 0.5 * (residual_px / shown_px).squaredNorm();

@@ -107,6 +107,18 @@ bool MeasurementUpdate::solve(int iterations) {
   return true;
 }
 
+std::vector<double> MeasurementUpdate::noiseLeft() const {
+  // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
+  Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(llt_.rows(), llt_.rows());
+  llt_.matrixL().solveInPlace(inverse_root);
+  std::vector<double> left;
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    left.push_back(0.5 * measurements_[i].variance_px2 *
+                   inverse_root.middleCols<2>(2 * i).squaredNorm());
+  }
+  return left;
+}
+
 void MeasurementUpdate::finish() { llt_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(X_); }
 
 }  // namespace active_matching_slam

@@ -37,6 +37,8 @@ class MeasurementUpdate {
   const CameraState& camera() const { return camera_; }
   const std::vector<FeatureState>& features() const { return features_; }
   double nis() const { return nis_; }
+  /// UpdateReport::noise_left of each measurement; after solve().
+  std::vector<double> noiseLeft() const;
   const Eigen::MatrixXd& gaugeChange() const { return C_; }       ///< state size x kGaugeFreedoms
   const Eigen::MatrixXd& gaugeFunctionals() const { return L_; }  ///< likewise
   const Eigen::MatrixXd& gaugeCovariance() const { return PL_; }  ///< P L

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "active_matching_slam/filter/match_motion.h"
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/quantile.h"
 #include "adjusted_start.h"
@@ -13,7 +14,7 @@ namespace active_matching_slam {
 namespace {
 
 /// Parallax: adjusted first at [sigma of the noise of image points], and no more beyond.
-constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 16.0;
+constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 20.0;
 constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next
 /// Share of the points: where most are as far as each other, the few that are near tell the motion.
 constexpr double kAllButNear = 0.75;
@@ -23,7 +24,12 @@ constexpr std::size_t kMostImages = 40;     ///< kept
 constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
+/// The cleanest features count for this much noise of most, so that the rest tell something too.
+constexpr double kCleanestNoise = 0.5;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
+/// What an adjustment takes for the noise of image points at least, with much parallax. While there
+/// is hardly any, the covariance, which is linear, says too little: with a parallax of this, twice.
+constexpr double kLeastNoisePx = 0.05, kNoiseDoublesAtPx = 1.0;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 constexpr double kMostMisread = 0.1;        ///< of a way's square that a change of unit leaves
 
@@ -32,16 +38,6 @@ const FeatureMeasurement* find(const std::vector<FeatureMeasurement>& measuremen
       std::lower_bound(measurements.begin(), measurements.end(), id,
                        [](const FeatureMeasurement& m, FeatureId i) { return m.id < i; });
   return it != measurements.end() && it->id == id ? &*it : nullptr;
-}
-
-/// Length [px] of the way of the points seen in both, all but the longest.
-double motionBetween(const std::vector<FeatureMeasurement>& a,
-                     const std::vector<FeatureMeasurement>& b) {
-  std::vector<double> lengths;
-  for (const FeatureMeasurement& m : a)
-    if (const FeatureMeasurement* same = find(b, m.id))
-      lengths.push_back((m.pixel - same->pixel).norm());
-  return quantileOf(std::move(lengths), kAllButNear);
 }
 
 std::vector<Eigen::Vector2d> zeros(std::size_t count) {
@@ -162,15 +158,16 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
   for (auto& observations : bundle->observations) {
     std::vector<BundleObservation> remaining;
     for (const BundleObservation& o : observations)
-      if (place[o.feature] >= 0) remaining.push_back({place[o.feature], o.pixel, o.d_calibration});
+      if (place[o.feature] >= 0)
+        remaining.push_back({place[o.feature], o.pixel, o.d_calibration, o.noise});
     observations.swap(remaining);
   }
 }
 
 /// Adjusts all of `reading`, first by the noise assumed and then by that which it shows, and leaves
 /// features that wander out of it, of `believed` and of `ids`. `options` keeps the lower noise.
-void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* reading,
-                      Bundle* believed, std::vector<FeatureId>* ids) {
+void adjustByItsNoise(const CameraModel& model, double parallax_px, BundleOptions* options,
+                      Bundle* reading, Bundle* believed, std::vector<FeatureId>* ids) {
   options->sigma_inverse_depth =
       std::max(options->sigma_inverse_depth,
                kDepthSpread * medianDeviation(*reading, options->inverse_depth));
@@ -180,7 +177,8 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
   const double scale = noiseOf(model, *reading);
   options->outlier_px =
       std::clamp(kOutlierSigmas * scale, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
-  options->sigma_px = options->outlier_px / kOutlierSigmas;
+  const double least_px = kLeastNoisePx * (1.0 + kNoiseDoublesAtPx / parallax_px);
+  options->sigma_px = std::min(options->sigma_px, std::max(scale, least_px));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);
 }
@@ -195,6 +193,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   unit_drift_ = least_motion_px_ = 1.0;
   last_parallax_px_ = next_parallax_px_ = 0.0;
   age_ = last_age_ = 0;
+  chosen_.reset();
 }
 
 void StartAdjustment::addFirstSights(const std::vector<FeatureMeasurement>& measurements) {
@@ -246,8 +245,8 @@ void StartAdjustment::rememberFeatures(const Ekf& filter) {
 void StartAdjustment::thinOut() {
   const std::size_t n = images_.size();
   if (n >= 4 && (images_[n - 3].measurements.size() < kLeastPoints ||
-                 motionBetween(images_[n - 3].measurements, images_[n - 4].measurements) <
-                     least_motion_px_)) {
+                 quantileOf(matchMotions(images_[n - 4].measurements, images_[n - 3].measurements),
+                            kAllButNear) < least_motion_px_)) {
     images_.erase(images_.end() - 3);
   }
   if (images_.size() <= kMostImages) return;
@@ -283,6 +282,23 @@ bool StartAdjustment::isTime(double parallax_px, double sigma_px) {
   return true;
 }
 
+/// Standard deviation of each feature's matches as the last image with it had it, in that of most.
+std::vector<double> StartAdjustment::noiseOfFeatures(const std::vector<FeatureId>& ids) const {
+  std::vector<double> noise_px(ids.size(), 0.0), known_px;
+  for (const Image& image : images_)
+    for (const FeatureMeasurement& m : image.measurements) {
+      const auto it = std::lower_bound(ids.begin(), ids.end(), m.id);
+      if (it != ids.end() && *it == m.id && m.sigma_px > 0.0)
+        noise_px[it - ids.begin()] = m.sigma_px;
+    }
+  for (const double sigma_px : noise_px)
+    if (sigma_px > 0.0) known_px.push_back(sigma_px);
+  const double most_px = medianOf(std::move(known_px));
+  for (double& noise : noise_px)
+    noise = noise > 0.0 ? std::max(kCleanestNoise, noise / most_px) : 1.0;
+  return noise_px;
+}
+
 Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const {
   Bundle bundle;
   for (const FeatureState& feature : features_) {
@@ -293,6 +309,7 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
     ids->push_back(feature.id);
     bundle.features.push_back(seenFromOrigin(feature));
   }
+  const std::vector<double> noise = noiseOfFeatures(*ids);
   for (const Image& image : images_) {
     bundle.cameras.push_back(image.camera);
     bundle.observations.emplace_back();
@@ -301,6 +318,7 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
       const auto it = std::lower_bound(ids->begin(), ids->end(), m.id);
       if (it == ids->end() || *it != m.id) continue;
       BundleObservation o{static_cast<int>(it - ids->begin()), m.pixel};
+      o.noise = noise[o.feature];
       o.d_calibration << rowShare(model, m.pixel.y()) * image.speeds[i],
           model.pixelByCorrection(m.pixel);
       bundle.observations.back().push_back(o);
@@ -311,14 +329,20 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
 
 std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, const Ekf& filter) {
   if (!is_active_ || images_.size() < 4) return std::nullopt;
-  const auto parallax_px = parallax(model);
-  if (!parallax_px) end();
-  if (!parallax_px || !isTime(*parallax_px, filter.options().sigma_px)) return std::nullopt;
-  if (*parallax_px >= kLastParallaxPx) end();
+  if (!chosen_) {
+    const auto parallax_px = parallax(model);
+    if (!parallax_px) end();
+    if (!parallax_px || !isTime(*parallax_px, filter.options().sigma_px)) return std::nullopt;
+    chosen_ = chooseReading(model, filter, *parallax_px);
+    if (!chosen_ && *parallax_px >= kLastParallaxPx) end();
+    return std::nullopt;  // the rest waits for the next image, so that no frame takes long
+  }
+  const Reading chosen = *std::exchange(chosen_, std::nullopt);
+  if (chosen.parallax_px >= kLastParallaxPx) end();
+  return adjustTo(model, filter, chosen);
+}
 
-  std::vector<FeatureId> ids;
-  Bundle believed = makeBundle(model, &ids);
-  if (!isConnected(believed)) return std::nullopt;
+BundleOptions StartAdjustment::optionsFor(const Ekf& filter) const {
   BundleOptions options;
   options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
   options.sigma_px = filter.options().sigma_px;
@@ -327,15 +351,66 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
   // So few images would bend the lens until depths fit their prior: it stays as calibrated.
   options.sigma_calibration[0] = filter.options().initial_sigma_readout_s;
+  return options;
+}
 
-  Bundle in_prior_unit = believed;  // a known scale may have been set
-  chooseUnit(options, &in_prior_unit);
-  auto reading = bestReading(model, options, in_prior_unit);
-  if (!reading) return std::nullopt;
-  adjustByItsNoise(model, &options, &*reading, &believed, &ids);
+/// What the filter believes and its opposites are told apart. Empty when none is clearly the best.
+std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const CameraModel& model,
+                                                                       const Ekf& filter,
+                                                                       double parallax_px) const {
+  Reading chosen;
+  chosen.parallax_px = parallax_px;
+  chosen.bundle = makeBundle(model, &chosen.ids);
+  if (!isConnected(chosen.bundle)) return std::nullopt;
+  const BundleOptions options = optionsFor(filter);
+  chooseUnit(options, &chosen.bundle);  // a known scale may have been set
+  for (const Image& image : images_) chosen.images.push_back(image.index);
+  auto best = bestReading(model, options, chosen.bundle);
+  if (!best) return std::nullopt;
+  chosen.bundle = std::move(*best);
+  return chosen;
+}
+
+/// All images kept, as `chosen` reads those that it has; others moved as the last of them, and
+/// features that it has not where the filter has them.
+Bundle StartAdjustment::continued(const Reading& chosen, const Bundle& believed,
+                                  const std::vector<FeatureId>& ids) const {
+  Bundle all = believed;
+  all.calibration = chosen.bundle.calibration;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto it = std::lower_bound(chosen.ids.begin(), chosen.ids.end(), ids[i]);
+    if (it != chosen.ids.end() && *it == ids[i])
+      all.features[i] = chosen.bundle.features[it - chosen.ids.begin()];
+  }
+  Eigen::Isometry3d correction = Eigen::Isometry3d::Identity();
+  for (std::size_t k = 0; k < images_.size(); ++k) {
+    const auto it = std::lower_bound(chosen.images.begin(), chosen.images.end(), images_[k].index);
+    if (it != chosen.images.end() && *it == images_[k].index) {
+      all.cameras[k] = chosen.bundle.cameras[it - chosen.images.begin()];
+      correction =
+          all.cameras[k].poseWorldCamera() * believed.cameras[k].poseWorldCamera().inverse();
+      continue;
+    }
+    const Eigen::Isometry3d T_world_camera = correction * believed.cameras[k].poseWorldCamera();
+    all.cameras[k].position_world = T_world_camera.translation();
+    all.cameras[k].q_world_camera = Eigen::Quaterniond(T_world_camera.linear()).normalized();
+  }
+  return all;
+}
+
+std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model, const Ekf& filter,
+                                                       const Reading& chosen) {
+  std::vector<FeatureId> ids;
+  Bundle believed = makeBundle(model, &ids);
+  if (!isConnected(believed)) return std::nullopt;
+  BundleOptions options = optionsFor(filter);
+  Bundle reading = believed;
+  chooseUnit(options, &reading);  // that of `chosen`
+  reading = continued(chosen, reading, ids);
+  adjustByItsNoise(model, chosen.parallax_px, &options, &reading, &believed, &ids);
 
   // Others have seen the way, so that its unit stays, as far as it was known.
-  const double by_depths = depthFactor(believed, *reading), by_way = wayFactor(believed, *reading);
+  const double by_depths = depthFactor(believed, reading), by_way = wayFactor(believed, reading);
   const bool keeps_way = (last_parallax_px_ > 0.0 || is_unit_known_) && by_way > 0.0;
   double drift = unit_drift_;
   if (keeps_way) {
@@ -343,18 +418,19 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
     if (!is_unit_known_)
       drift = std::pow(drift, 1.0 / (1.0 + std::pow(options.sigma_px / last_parallax_px_, 2)));
   }
-  rescaleBundle(by_depths * drift / unit_drift_, &*reading);
-  auto start = makeAdjustedStart(model, filter, options, *reading, ids,
+  rescaleBundle(by_depths * drift / unit_drift_, &reading);
+  auto start = makeAdjustedStart(model, filter, options, reading, ids,
                                  keeps_way ? BundleUnit::kWay : BundleUnit::kDepths,
                                  images_.back().interval_s);
   if (!start) return std::nullopt;
-  if (*parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
+  if (chosen.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();
     return std::nullopt;
   }
-  adopt(*reading, ids, &*start);
+  start->is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
+  adopt(reading, ids, &*start);
   unit_drift_ = drift;
-  last_parallax_px_ = *parallax_px;
+  last_parallax_px_ = chosen.parallax_px;
   return start;
 }
 

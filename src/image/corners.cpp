@@ -1,9 +1,11 @@
 #include "active_matching_slam/image/corners.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <tuple>
 
 namespace active_matching_slam {
@@ -11,6 +13,8 @@ namespace {
 
 constexpr int kTensorWindow = 5;  // [px]
 constexpr int kSmallestCell = 32;
+constexpr int kSettlings = 2;        ///< windows looked at for where a corner is steadiest
+constexpr double kFarthestPx = 3.0;  ///< of that from the corner found
 
 /// A part of the image that may give one corner.
 struct Cell {
@@ -93,6 +97,51 @@ Corner strongestCorner(const Cell& cell, const std::vector<Eigen::Vector2d>& occ
   return best;
 }
 
+/// Least squares move a template by A^-1 sum(g g^T M (x - p)) where the image is warped about p by
+/// I + M unforeseen, g: gradient at x, A = sum(g g^T). Of all small M alike, the expected square of
+/// that is least for p_k = tr(A^-1 sum(g g^T x_k)) / 2. Empty when the window does not determine
+/// it.
+std::optional<Eigen::Vector2d> steadiestPoint(const cv::Mat& image, const Eigen::Vector2d& middle,
+                                              int size) {
+  const int u = static_cast<int>(middle.x()), v = static_cast<int>(middle.y()), half = size / 2;
+  if (u <= half || v <= half || u + half + 1 >= image.cols || v + half + 1 >= image.rows)
+    return std::nullopt;
+  Eigen::Matrix2d A = Eigen::Matrix2d::Zero(), by_u = A, by_v = A;
+  for (int dv = -half; dv <= half; ++dv) {
+    const std::uint8_t* above = image.ptr<std::uint8_t>(v + dv - 1) + u;
+    const std::uint8_t* row = image.ptr<std::uint8_t>(v + dv) + u;
+    const std::uint8_t* below = image.ptr<std::uint8_t>(v + dv + 1) + u;
+    for (int du = -half; du <= half; ++du) {
+      const Eigen::Vector2d g(row[du + 1] - row[du - 1], below[du] - above[du]);
+      const Eigen::Matrix2d tensor = g * g.transpose();
+      A += tensor;
+      by_u += du * tensor;
+      by_v += dv * tensor;
+    }
+  }
+  const Eigen::Matrix2d inverse = A.inverse();
+  const Eigen::Vector2d shift(0.5 * (inverse * by_u).trace(), 0.5 * (inverse * by_v).trace());
+  if (!shift.allFinite()) return std::nullopt;
+  return middle + shift;
+}
+
+/// The corner's place where the template keeps it best, or the corner's own where that is far off
+/// or not allowed.
+Corner settled(const Corner& corner, const cv::Mat& image, const cv::Rect& area,
+               const std::vector<Eigen::Vector2d>& occupied, double squared_distance, int size) {
+  Corner settled = corner;
+  for (int k = 0; k < kSettlings; ++k) {
+    const auto point = steadiestPoint(image, settled.pixel, size);
+    if (!point || !((*point - corner.pixel).norm() <= kFarthestPx)) return corner;
+    settled.pixel = {std::round(point->x()), std::round(point->y())};
+  }
+  const bool is_inside =
+      area.contains({static_cast<int>(settled.pixel.x()), static_cast<int>(settled.pixel.y())});
+  return is_inside && squaredDistanceToNearest(settled.pixel, occupied) >= squared_distance
+             ? settled
+             : corner;
+}
+
 }  // namespace
 
 std::vector<Corner> detectCorners(const cv::Mat& image,
@@ -126,13 +175,14 @@ std::vector<Corner> detectCorners(const cv::Mat& image,
       strongest = std::max(strongest, most);
     }
     for (std::size_t i = begin; i < end; ++i) {
-      const Corner corner = strongestCorner(cells[i], taken, squared_distance);
+      Corner corner = strongestCorner(cells[i], taken, squared_distance);
       cells[i].response.release();
       if (corner.response <= 0.0 || corner.response < options.corner_quality * strongest) continue;
       if (contrastAround(image, static_cast<int>(corner.pixel.x()),
                          static_cast<int>(corner.pixel.y()),
                          options.template_size_px) < options.minimum_contrast)
         continue;
+      corner = settled(corner, image, area, taken, squared_distance, options.template_size_px);
       corners.push_back(corner);
       taken.push_back(corner.pixel);
       if (static_cast<int>(corners.size()) == wanted) return corners;

@@ -201,10 +201,13 @@ void ImageFeatureSearch::addMatch(Feature& feature, const Candidate& peak) {
     std::copy_n(&feature.scores[indexOf(feature.box, peak.u - 1, peak.v + dv)], 3,
                 &around[3 * (dv + 1)]);
   const Eigen::Vector2d middle(peak.u, peak.v), start = middle + paraboloidPeak(around);
-  const std::optional<Eigen::Vector2d> refined = refineSubpixel(image_, feature.patch, start);
+  const std::optional<TemplateFit> fit = refineSubpixel(image_, feature.patch, start);
   SearchMatch match;
-  match.pixel =
-      refined && (*refined - middle).cwiseAbs().maxCoeff() <= kFarthestPeak ? *refined : start;
+  match.pixel = start;
+  if (fit && (fit->pixel - middle).cwiseAbs().maxCoeff() <= kFarthestPeak) {
+    match.pixel = fit->pixel;
+    match.sigma_px = fit->sigma_px;
+  }
   match.score = peak.score;
   match.id = static_cast<int>(feature.matches.size());
   feature.matches.push_back(match);

@@ -1,6 +1,7 @@
 #include "active_matching_slam/image/subpixel.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -62,6 +63,7 @@ class NormalEquations {
     left_ << s[0], s[1], s[2], s[3], s[1], s[4], s[5], s[6], s[2], s[5], s[7], s[8], s[3], s[6],
         s[8], size * size;
     right_ << s[9], s[10], s[11], s[12];
+    pixels_ = size * size;
   }
 
   /// Empty when they are singular: nothing there, or an edge that slides along itself.
@@ -72,9 +74,17 @@ class NormalEquations {
     return solver.solve(right_);
   }
 
+  /// Of the shift per axis [px], at a solution x and for a template of variance `variance`.
+  double sigma(const Eigen::Vector4d& x, double variance) const {
+    const double left_over = std::max(0.0, pixels_ * variance - x.dot(right_)) / (pixels_ - 4);
+    const Eigen::Matrix4d inverse = left_.inverse();
+    return std::sqrt(0.5 * left_over * (inverse(1, 1) + inverse(2, 2))) / x[0];
+  }
+
  private:
   Eigen::Matrix4d left_;
   Eigen::Vector4d right_;
+  int pixels_ = 0;
 };
 
 }  // namespace
@@ -94,8 +104,8 @@ Eigen::Vector2d paraboloidPeak(const float s[9]) {
           std::clamp((e * b - 2.0 * d * c) / determinant, -0.5, 0.5)};
 }
 
-std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Template& patch,
-                                              const Eigen::Vector2d& start) {
+std::optional<TemplateFit> refineSubpixel(const cv::Mat& image, const Template& patch,
+                                          const Eigen::Vector2d& start) {
   constexpr int kIterations = 10;
   // The error left after a step is a fraction of it.
   constexpr double kConverged = 0.01, kLargestMove = 1.0;
@@ -115,13 +125,14 @@ std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Templa
   SampledWindow window;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     if (!window.sample(image, pixel, size)) return std::nullopt;
-    const std::optional<Eigen::Vector4d> x =
-        NormalEquations(window, wanted.data(), size, mean).solve();
+    const NormalEquations equations(window, wanted.data(), size, mean);
+    const std::optional<Eigen::Vector4d> x = equations.solve();
     if (!x || !((*x)[0] > 0.05)) return std::nullopt;  // inverted or vanished contrast
     const Eigen::Vector2d step = x->segment<2>(1) / (*x)[0];
     pixel += step;
     if (!((pixel - start).norm() <= kLargestMove)) return std::nullopt;
-    if (step.norm() < kConverged) return pixel;
+    if (step.norm() < kConverged)
+      return TemplateFit{pixel, equations.sigma(*x, patch.contrast() * patch.contrast())};
   }
   return std::nullopt;
 }

@@ -61,7 +61,7 @@ class Tracker::Implementation {
   double expectedOf(const MatchStatistics& s) const;
   bool isByChance(const MatchResult& result, double expected) const;
   void match(const cv::Mat& image, TrackedFrame* frame);
-  void learnNoise();
+  void learnNoise(const UpdateReport& report);
   void correct(const cv::Mat& image, TrackedFrame* frame);
   void judge();
   void lose(const std::string& reason);

@@ -123,7 +123,8 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
     const double inverse_depth = depthPrior(corner.pixel, known_depths);
     MapFeature feature;
     feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
-                                                relative_sigma * inverse_depth);
+                                                relative_sigma * inverse_depth,
+                                                match_noise_.sigma_px(options_.filter));
     if (feature.id < 0) continue;
     first_sights.push_back({feature.id, corner.pixel, 0.0});
     feature.patch = std::move(*patch);

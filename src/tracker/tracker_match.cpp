@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "active_matching_slam/filter/match_motion.h"
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/image/image_motion.h"
 #include "active_matching_slam/image/warp.h"
@@ -28,6 +30,7 @@ constexpr double kFirstShare = 0.6;        ///< of the budget, for the first att
 constexpr double kShareOfRest = 0.5;       ///< for each opinion but the last, which has it all
 constexpr double kAgreementChi2 = 13.8;    ///< 99.9 % of 2 degrees of freedom
 constexpr double kMostLogFalseAlarms = -1.0;
+constexpr double kLeastNoiseLeft = 0.1;  ///< of a match's variance, for what is left to tell it
 /// Share of its velocity that a camera keeps from one frame without matches to the next: a hand
 /// that jerks does not go on for long.
 constexpr double kSlowingUnseen = 0.7;
@@ -231,17 +234,23 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   result.statistics.matched = 0;
 }
 
-/// Learns from what the matches fused miss of the map as it is now how noisy they are.
-void Tracker::Implementation::learnNoise() {
+/// Learns from what the matches fused miss of the map as it is now how noisy they are. Where the
+/// state has followed nearly all of a match, what is left tells nothing.
+void Tracker::Implementation::learnNoise(const UpdateReport& report) {
   const CameraModel lens = camera_.corrected(filter_.camera().lens);
   const Eigen::Vector2d unknown =
       Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<Eigen::Vector2d> residuals_px;
-  for (const FeatureMeasurement& fused : fused_) {
-    const auto projection = projectFeature(lens, filter_.camera(), *filter_.find(fused.id));
-    residuals_px.push_back(projection ? fused.pixel - projection->pixel : unknown);
+  for (std::size_t i = 0; i < fused_.size(); ++i) {
+    const FeatureId id = fused_[i].id;
+    const auto projection = projectFeature(lens, filter_.camera(), *filter_.find(id));
+    const double left = report.noise_left[i];
+    const double unit = std::sqrt(left) * match_noise_.likeMost(map_.find(id)->noise);
+    residuals_px.push_back(projection && left > kLeastNoiseLeft
+                               ? Eigen::Vector2d((fused_[i].pixel - projection->pixel) / unit)
+                               : unknown);
   }
-  const double shown_px = match_noise_.learn(options_.filter, residuals_px);
+  const double shown_px = match_noise_.learn(residuals_px);
   if (!(shown_px > 0.0)) return;
   for (std::size_t i = 0; i < fused_.size(); ++i)
     map_.learnNoise(fused_[i].id, residuals_px[i], shown_px);
@@ -249,7 +258,6 @@ void Tracker::Implementation::learnNoise() {
 
 /// Fuses the accepted matches, and learns from them.
 void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame) {
-  fused_.clear();
   std::vector<int> matched;
   const int n = prior_.size();
   for (int i = 0; i < n; ++i) {
@@ -258,21 +266,31 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
   }
   const int m = static_cast<int>(matched.size());
   Eigen::VectorXd innovation(2 * m);
+  std::vector<double> sigmas_px(m);
   for (int a = 0; a < m; ++a) {
     const SearchMatch& match =
         search_.matches(matched[a])[frame->matching.match_of_feature[matched[a]]];
     innovation.segment<2>(2 * a) = match.pixel - prior_.mean(matched[a]);
+    sigmas_px[a] = match.sigma_px;
   }
   const Eigen::MatrixXd S = selectFeatures(prior_.S, matched);
-  frame->match_sigma_px = match_noise_.sigma_px(options_.filter);
+  std::vector<FeatureMeasurement> fused;
+  std::vector<double> seen_px;
   for (int k : agreeingMeasurements(innovation, S, kAgreementChi2)) {
     const FeatureId id = prior_.ids[matched[k]];
-    fused_.push_back({id, prior_.mean(matched[k]) + innovation.segment<2>(2 * k),
-                      match_noise_.sigma_px(options_.filter, map_.find(id)->noise)});
+    fused.push_back({id, prior_.mean(matched[k]) + innovation.segment<2>(2 * k), 0.0});
+    map_.seeNoise(id, sigmas_px[k]);
+    if (sigmas_px[k] > 0.0) seen_px.push_back(sigmas_px[k]);
   }
+  match_noise_.see(std::move(seen_px));
+  match_noise_.seeMotion(matchMotions(fused_, fused));
+  frame->match_sigma_px = match_noise_.sigma_px(options_.filter);
+  for (FeatureMeasurement& match : fused)
+    match.sigma_px = match_noise_.sigma_px(options_.filter, map_.find(match.id)->noise);
+  fused_ = std::move(fused);
 
   const UpdateReport report = filter_.update(camera_, fused_);
-  learnNoise();
+  learnNoise(report);
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 

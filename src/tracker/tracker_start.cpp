@@ -74,7 +74,7 @@ void Tracker::Implementation::adjustStart(TrackedFrame* frame) {
     return adjusted->corrected(image, T_world_camera);
   });
   filter_.restore(adjusted->camera, adjusted->features, adjusted->covariance, filter_.nextId());
-  structure_.restartAverages();
+  if (!adjusted->is_refinement) structure_.restartAverages();
 }
 
 bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame) {

@@ -255,6 +255,43 @@ TEST(BundleAdjustment, AWanderingFeatureHardlyMovesTheRest) {
   EXPECT_LT(errors[6], 0.3);
 }
 
+TEST(BundleAdjustment, NoisyImagePointsCountForLess) {
+  const CameraModel model(exampleCalibration());
+  const Bundle truth = exampleBundle(model, 8, 30, 0.05, 0.0, 4);
+  BundleOptions options = weakPrior();
+  options.sigma_px = 0.1;
+  options.outlier_px = 1e6;
+  const auto adjusted = [&](double noise) {
+    Bundle bundle = truth;
+    Random random(5);
+    for (auto& observations : bundle.observations)
+      for (BundleObservation& o : observations) {
+        if (o.feature % 3 != 0) continue;
+        o.pixel += Eigen::Vector2d(random.normal(1.0), random.normal(1.0));
+        o.noise = noise;
+      }
+    adjustBundle(model, options, &bundle);
+    return bundle;
+  };
+  const auto error = [&](const Bundle& bundle) {
+    const Eigen::Vector3d& end = bundle.cameras.back().position_world;
+    const Eigen::Vector3d& true_end = truth.cameras.back().position_world;
+    return (end / end.norm() - true_end / true_end.norm()).norm();
+  };
+  EXPECT_LT(error(adjusted(10.0)), 0.5 * error(adjusted(1.0)));
+  EXPECT_NEAR(featureErrors(model, adjusted(10.0))[0], 0.1, 0.05);
+
+  Bundle twice = truth;
+  for (auto& observations : twice.observations)
+    for (BundleObservation& o : observations) o.noise = 2.0;
+  BundleOptions twice_by_options = options;
+  twice_by_options.sigma_px = 0.2;
+  const Eigen::MatrixXd a = bundleCovariance(model, options, twice, 1, BundleUnit::kDepths, 1e-3);
+  const Eigen::MatrixXd b =
+      bundleCovariance(model, twice_by_options, truth, 1, BundleUnit::kDepths, 1e-3);
+  EXPECT_LT((a - b).norm(), 1e-6 * b.norm());
+}
+
 TEST(BundleAdjustment, ReversedDepthsExchangeNearAndFarAndKeepWhatANarrowViewShows) {
   const CameraModel model(exampleCalibration());
   const Eigen::Vector2d middle(315.0, 243.0);

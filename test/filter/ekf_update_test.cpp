@@ -58,6 +58,31 @@ double relativeDifference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return (a - b).norm() / b.norm();
 }
 
+TEST_F(EkfUpdate, TellsHowMuchOfItsNoiseEachMatchStillShows) {
+  Ekf filter = exampleFilter(model_, 1, 6);
+  FilterOptions once = filter.options();
+  once.update_iterations = 1;
+  filter.setOptions(once);
+  const PredictedMeasurements predicted = filter.predictMeasurements(model_, idsOf(filter));
+  std::vector<FeatureMeasurement> measurements;
+  for (std::size_t i = 0; i < predicted.ids.size(); ++i)
+    measurements.push_back({predicted.ids[i], predicted.z.segment<2>(2 * i), 0.0});
+  measurements.insert(measurements.begin() + 1, {12345, Eigen::Vector2d(1.0, 1.0), 0.0});
+  const UpdateReport report = filter.update(model_, measurements);
+  ASSERT_EQ(report.noise_left.size(), measurements.size());
+  EXPECT_EQ(report.noise_left[1], 0.0) << "of no feature";
+  const Eigen::MatrixXd inverse = predicted.S.inverse();
+  for (std::size_t i = 0; i < predicted.ids.size(); ++i) {
+    // The covariance of R S^-1 y, over that of the match.
+    const double plain =
+        0.5 * once.sigma_px * once.sigma_px * inverse.block<2, 2>(2 * i, 2 * i).trace();
+    const double left = report.noise_left[i == 0 ? 0 : i + 1];
+    EXPECT_NEAR(left, plain, 1e-9);
+    EXPECT_GT(left, 0.0);
+    EXPECT_LT(left, 1.0);
+  }
+}
+
 TEST_F(EkfUpdate, PredictedMeasurementsEqualThePlainFormula) {
   for (const CameraState& calibration : {CameraState(), poorlyCalibratedCamera()}) {
     const Ekf filter = exampleFilter(model_, 1, 6, calibration);

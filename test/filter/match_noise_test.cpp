@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <random>
 #include <vector>
@@ -28,48 +29,89 @@ double learntFrom(double sigma, double share_far_off, const FilterOptions& optio
   for (int k = 0; k < 2000; ++k) {
     std::vector<Eigen::Vector2d> residuals = gaussian(sigma, 50, &generator);
     for (std::size_t i = 0; i < 50 * share_far_off; ++i) residuals[i].setConstant(5.0);
-    noise.learn(options, residuals);
+    noise.learn(residuals);
   }
   return noise.sigma_px(options);
 }
 
-TEST(MatchNoise, IsInProportionToWhatUpdatesLeaveWhateverAFewMatchesSay) {
+TEST(MatchNoise, IsWhatUpdatesLeaveWhateverAFewMatchesSay) {
   FilterOptions options;
   options.minimum_sigma_px = 0.01;
   const double learnt = learntFrom(0.04, 0.0, options);
-  EXPECT_GT(learnt, 0.04);
-  EXPECT_LT(learnt, options.sigma_px);
+  EXPECT_NEAR(learnt, 0.04, 0.005);
   EXPECT_NEAR(learntFrom(0.06, 0.0, options), 1.5 * learnt, 0.05 * learnt);
   EXPECT_NEAR(learntFrom(0.04, 0.1, options), learnt, 0.2 * learnt);
+}
+
+TEST(MatchNoise, HasWhatImagesTellAddedSinceUpdatesDoNotShowIt) {
+  const FilterOptions options;
+  MatchNoise noise;
+  std::mt19937 generator(1);
+  for (int k = 0; k < 200; ++k) noise.learn(gaussian(0.04, 50, &generator));
+  const double shown = noise.sigma_px(options);
+  noise.see(std::vector<double>(7, 0.1));  // too few
+  EXPECT_EQ(noise.sigma_px(options), shown);
+  noise.see({0.01, 0.02, 0.1, 0.1, 0.1, 0.1, 0.1, 5.0, 9.0});
+  EXPECT_GT(noise.sigma_px(options), std::hypot(shown, 0.05));
+  EXPECT_LT(noise.sigma_px(options), std::hypot(shown, 0.12));
+}
+
+TEST(MatchNoise, OfAFeatureGrowsWithWhatIsLeftBetweenItsImagesAndItsTemplate) {
+  const FilterOptions options;
+  MatchNoise noise;
+  std::mt19937 generator(1);
+  for (int k = 0; k < 200; ++k) noise.learn(gaussian(0.04, 50, &generator));
+  FeatureNoise usual, worse, better, unknown;
+  for (int k = 0; k < 100; ++k) {
+    noise.see(std::vector<double>(20, 0.05));
+    usual.see(0.05);
+    worse.see(0.1);
+    better.see(0.03);
+    unknown.see(0.0);
+  }
+  EXPECT_NEAR(worse.seen_px(), 0.1, 1e-9);
+  EXPECT_NEAR(noise.likeMost(usual), 1.0, 1e-9);
+  EXPECT_EQ(noise.likeMost(unknown), 1.0);
+  EXPECT_GT(noise.likeMost(worse), 2.0);
+  EXPECT_LT(noise.likeMost(better), 0.6);
+  EXPECT_NEAR(noise.sigma_px(options, worse), noise.likeMost(worse) * noise.sigma_px(options),
+              1e-9);
+  EXPECT_LT(noise.sigma_px(options, better), noise.sigma_px(options));
+  EXPECT_GE(noise.sigma_px(options, better), options.minimum_sigma_px);
+  for (int k = 0; k < 100; ++k) worse.see(0.05);  // it is seen well again
+  EXPECT_NEAR(noise.likeMost(worse), 1.0, 0.05);
 }
 
 TEST(MatchNoise, StaysBetweenItsBounds) {
   FilterOptions options;
   EXPECT_EQ(learntFrom(1.0, 0.0, options), options.sigma_px);
-  EXPECT_EQ(learntFrom(0.001, 0.0, options), options.minimum_sigma_px);
+  EXPECT_NEAR(learntFrom(1e-5, 0.0, options), options.minimum_sigma_px, 1e-6);
   options.minimum_sigma_px = 1.0;  // above sigma_px: nothing is learnt
   EXPECT_EQ(learntFrom(0.1, 0.0, options), options.sigma_px);
 }
 
-TEST(MatchNoise, IsNotLearntInAHurry) {
-  FilterOptions options;
+TEST(MatchNoise, IsKnownFromTheFirstUpdatesAndAveragedFromThenOn) {
+  const FilterOptions options;
   MatchNoise noise;
   EXPECT_EQ(noise.sigma_px(options), options.sigma_px);
   std::mt19937 generator(1);
-  for (int k = 0; k < 10; ++k) noise.learn(options, gaussian(0.05, 50, &generator));
-  EXPECT_LT(noise.sigma_px(options), options.sigma_px);
-  EXPECT_GT(noise.sigma_px(options), 0.8 * options.sigma_px);
+  for (int k = 0; k < 10; ++k) noise.learn(gaussian(0.05, 50, &generator));
+  EXPECT_NEAR(noise.sigma_px(options), learntFrom(0.05, 0.0, options), 0.01);
+  const double before = noise.sigma_px(options);
+  noise.learn(gaussian(0.1, 50, &generator));
+  EXPECT_GT(noise.sigma_px(options), before);
+  EXPECT_LT(noise.sigma_px(options), 1.2 * before);
   noise.reset();
   EXPECT_EQ(noise.sigma_px(options), options.sigma_px);
 }
 
 TEST(MatchNoise, TooLittleOrWhatIsNotANumberTellsNothing) {
-  FilterOptions options;
+  const FilterOptions options;
   MatchNoise noise;
   for (int k = 0; k < 2000; ++k) {
-    EXPECT_EQ(noise.learn(options, {}), 0.0);
-    EXPECT_EQ(noise.learn(options, std::vector<Eigen::Vector2d>(7, Eigen::Vector2d::Zero())), 0.0);
-    EXPECT_EQ(noise.learn(options, std::vector<Eigen::Vector2d>(20, not_a_number)), 0.0);
+    EXPECT_EQ(noise.learn({}), 0.0);
+    EXPECT_EQ(noise.learn(std::vector<Eigen::Vector2d>(7, Eigen::Vector2d::Zero())), 0.0);
+    EXPECT_EQ(noise.learn(std::vector<Eigen::Vector2d>(20, not_a_number)), 0.0);
   }
   EXPECT_EQ(noise.sigma_px(options), options.sigma_px);
 }
@@ -77,7 +119,26 @@ TEST(MatchNoise, TooLittleOrWhatIsNotANumberTellsNothing) {
 TEST(MatchNoise, TellsWhatAFrameShows) {
   std::mt19937 generator(1);
   MatchNoise noise;
-  EXPECT_NEAR(noise.learn(FilterOptions(), gaussian(0.05, 4000, &generator)), 0.05, 0.002);
+  EXPECT_NEAR(noise.learn(gaussian(0.05, 4000, &generator)), 0.05, 0.002);
+}
+
+TEST(MatchNoise, WhatDoesNotShowCountsMoreWhileTheImageHardlyMoves) {
+  const FilterOptions options;
+  std::mt19937 generator(1);
+  MatchNoise noise;
+  for (int k = 0; k < 100; ++k) noise.learn(gaussian(0.01, 50, &generator));
+  noise.see(std::vector<double>(20, 0.05));
+  const double usual = noise.sigma_px(options);
+  noise.seeMotion(std::vector<double>(20, 8.0));
+  EXPECT_EQ(noise.sigma_px(options), usual);
+  noise.seeMotion(std::vector<double>(20, 0.5));
+  const double slow = noise.sigma_px(options);
+  EXPECT_GT(slow, 1.5 * usual);
+  noise.seeMotion(std::vector<double>(20, 0.0));
+  EXPECT_GT(noise.sigma_px(options), slow);
+  EXPECT_LE(noise.sigma_px(options), options.sigma_px);
+  noise.seeMotion({0.0, 0.0});  // too few
+  EXPECT_EQ(noise.sigma_px(options), usual);
 }
 
 FeatureNoise learntFeature(double sigma, int matches, double shown_px) {
@@ -121,10 +182,11 @@ TEST(FeatureNoise, OneMatchFarOffDoesNotRuinAFeatureAndWhatIsNoNumberTellsNothin
 
 TEST(MatchNoise, OfAFeatureIsInProportionToItsOwnButNotBelowTheLeast) {
   FilterOptions options;
+  options.sigma_px = 0.3;
   options.minimum_sigma_px = 0.01;
   std::mt19937 generator(1);
   MatchNoise noise;
-  for (int k = 0; k < 500; ++k) noise.learn(options, gaussian(0.05, 50, &generator));
+  for (int k = 0; k < 500; ++k) noise.learn(gaussian(0.05, 50, &generator));
   const double most = noise.sigma_px(options);
   const FeatureNoise bad = learntFeature(0.5, 500, 0.05), good = learntFeature(0.01, 500, 0.05);
   EXPECT_EQ(noise.sigma_px(options, FeatureNoise()), most);

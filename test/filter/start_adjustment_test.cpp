@@ -76,7 +76,11 @@ class StartOfATrack {
     adjustment_.addFirstSights(first_sights);
   }
 
-  std::optional<AdjustedStart> adjust() { return adjustment_.adjust(model_, filter_); }
+  /// What has been chosen at one image is adjusted at the next.
+  std::optional<AdjustedStart> adjust() {
+    const auto adjusted = adjustment_.adjust(model_, filter_);
+    return adjusted ? adjusted : adjustment_.adjust(model_, filter_);
+  }
 
   static FilterOptions options() {
     FilterOptions options;

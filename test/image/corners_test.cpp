@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <random>
 #include <set>
+#include <utility>
 
+#include "active_matching_slam/image/subpixel.h"
 #include "textures.h"
 
 namespace active_matching_slam {
@@ -68,6 +72,43 @@ TEST(Corners, AreTheCornersOfSquares) {
     EXPECT_LE(to_side_u, 2.5);
     EXPECT_LE(to_side_v, 2.5);
   }
+}
+
+/// By how far a template around `point` misses it [px], root mean square, where the texture is
+/// warped about it in ways that nobody foresaw.
+double missUnderWarps(const WaveTexture& texture, const Eigen::Vector2d& point) {
+  constexpr int kSide = 31, kMiddle = kSide / 2, kWarps = 20;
+  const auto render = [&](const Eigen::Matrix2d& warp) {
+    cv::Mat image(kSide, kSide, CV_8UC1);
+    for (int v = 0; v < kSide; ++v)
+      for (int u = 0; u < kSide; ++u) {
+        const Eigen::Vector2d at = point + warp * Eigen::Vector2d(u - kMiddle, v - kMiddle);
+        image.at<std::uint8_t>(v, u) = WaveTexture::toGrey(texture.value(at.x(), at.y()));
+      }
+    return image;
+  };
+  const Template patch = cutTemplate(render(Eigen::Matrix2d::Identity()), kMiddle, kMiddle);
+  std::mt19937 generator(1);
+  double squares = 0.0;
+  for (int k = 0; k < kWarps; ++k) {
+    Eigen::Matrix2d warp = Eigen::Matrix2d::Identity();
+    for (int i = 0; i < 4; ++i) warp(i) += 0.1 * (generator() / 4294967296.0 - 0.5);
+    const Eigen::Vector2d middle(kMiddle, kMiddle);
+    const auto fit = refineSubpixel(render(warp), patch, middle);
+    squares += fit ? (fit->pixel - middle).squaredNorm() : 1.0;
+  }
+  return std::sqrt(squares / kWarps);
+}
+
+TEST(Corners, LieWhereUnforeseenWarpsMoveThemLeast) {
+  const WaveTexture texture(47, 8.0);
+  double there = 0.0, beside = 0.0;
+  for (const Corner& corner : detectCorners(texture.render(320, 240), {}, 30, 15.0, {})) {
+    there += missUnderWarps(texture, corner.pixel);
+    for (const auto& [u, v] : {std::make_pair(3, 0), {-3, 0}, {0, 3}, {0, -3}})
+      beside += 0.25 * missUnderWarps(texture, corner.pixel + Eigen::Vector2d(u, v));
+  }
+  EXPECT_LT(there, 0.85 * beside);
 }
 
 TEST(Corners, LeaveRoomForASourcePatchAndSitOnWholePixels) {

@@ -42,7 +42,8 @@ TEST(Paraboloid, WithoutAPeakGivesNoOffset) {
 struct Errors {
   double paraboloid = 0.0;  ///< root mean square of the distance per axis [px]
   double gradient = 0.0;
-  int lost = 0;  ///< the gradient method gave up
+  double told = 0.0;  ///< of the gradient method, by itself
+  int lost = 0;       ///< the gradient method gave up
   int count = 0;
 };
 
@@ -62,7 +63,7 @@ double cornerness(const WaveTexture& texture) {
 
 Errors measureErrors(double shortest_wave, double noise, double gain, double blur) {
   Errors errors;
-  double paraboloid = 0.0, gradient = 0.0;
+  double paraboloid = 0.0, gradient = 0.0, variance = 0.0;
   for (unsigned seed = 0; errors.count < 80; ++seed) {
     const WaveTexture texture(100 + seed, shortest_wave, 35.0);
     if (cornerness(texture) < 0.3) continue;  // nobody starts a feature there
@@ -82,13 +83,16 @@ Errors measureErrors(double shortest_wave, double noise, double gain, double blu
     const Eigen::Vector2d truth = Eigen::Vector2d(15, 15) + shift;
     paraboloid += (peak - truth).squaredNorm();
     ++errors.count;
-    if (const auto refined = refineSubpixel(second, patch, peak))
-      gradient += (*refined - truth).squaredNorm();
-    else
+    if (const auto fit = refineSubpixel(second, patch, peak)) {
+      gradient += (fit->pixel - truth).squaredNorm();
+      variance += fit->sigma_px * fit->sigma_px;
+    } else {
       ++errors.lost;
+    }
   }
   errors.paraboloid = std::sqrt(paraboloid / (2 * errors.count));
   errors.gradient = std::sqrt(gradient / (2 * (errors.count - errors.lost)));
+  errors.told = std::sqrt(variance / (errors.count - errors.lost));
   return errors;
 }
 
@@ -110,6 +114,24 @@ TEST(Subpixel, GradientsAreMorePreciseThanTheParaboloid) {
     EXPECT_LT(errors.gradient, errors.paraboloid) << c.name;
     EXPECT_LE(errors.lost, errors.count / 20) << c.name;
   }
+}
+
+TEST(Subpixel, TellsItsErrorFromWhatIsLeft) {
+  for (const double noise : {2.0, 5.0}) {
+    const Errors errors = measureErrors(6.0, noise, 1.0, 0.0);
+    EXPECT_NEAR(errors.told / errors.gradient, 1.0, 0.35) << noise;
+  }
+  const WaveTexture texture(7, 6.0);
+  cv::Mat image = texture.render(60, 60);
+  addNoise(&image, 2.0, 1);
+  const Template patch = *makeTemplate(image(cv::Rect(25, 25, 11, 11)));
+  addNoise(&image, 2.0, 2);
+  const auto seen = refineSubpixel(image, patch, {30.0, 30.0});
+  ASSERT_TRUE(seen);
+  image(cv::Rect(25, 25, 3, 11)) = 128;  // something hides a part of it
+  const auto hidden = refineSubpixel(image, patch, {30.0, 30.0});
+  ASSERT_TRUE(hidden);
+  EXPECT_GT(hidden->sigma_px, 2.0 * seen->sigma_px);
 }
 
 TEST(Subpixel, GivesUpRatherThanInvent) {

@@ -17,6 +17,7 @@ struct BundleObservation {
   /// How the pixel answers to the calibration, in the order of CameraError from kReadout on.
   Eigen::Matrix<double, 2, CameraError::kCalibrationSize> d_calibration =
       Eigen::Matrix<double, 2, CameraError::kCalibrationSize>::Zero();
+  double noise = 1.0;  ///< standard deviation, in BundleOptions::sigma_px
 };
 
 /// Cameras, features and calibration to be adjusted together. The first camera is the world: it
@@ -68,7 +69,8 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
                                  const Bundle& bundle, int first_camera, BundleUnit unit,
                                  double relative_scale_sigma);
 
-/// Root mean square [px], per axis, of what image points miss of each feature's projections.
+/// Root mean square [px], per axis, of what image points miss of each feature's projections, over
+/// their noise in that of most.
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle);
 
 /// The reading of the same images with near and far exchanged, which a narrow view or little

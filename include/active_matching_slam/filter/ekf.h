@@ -32,6 +32,9 @@ struct UpdateReport {
   int skipped = 0;      ///< unknown id, not finite, or behind the camera
   double nis = 0.0;     ///< normalised innovation squared of all used, 2 * used degrees of freedom
   bool healthy = true;  ///< false: the covariance had to be repaired or the update was refused
+  /// Of each measurement given, the share of its variance that it should still show, less the
+  /// feature's projection, after the update (per axis): the state follows the rest. 0: not used.
+  std::vector<double> noise_left;
 };
 
 /// Extended Kalman filter over camera and map with full covariance in error-state form. The map's
@@ -72,9 +75,11 @@ class Ekf {
   void doubtVelocity(double share);
 
   /// New feature seen at `pixel` in the present camera; returns its id, or -1 when the pixel can't
-  /// be unprojected. Zero `inverse_depth` takes the options' prior.
+  /// be unprojected. Zero `inverse_depth`, `sigma_inverse_depth` and `sigma_px` (of the pixel, per
+  /// axis) take what the options say.
   FeatureId addInverseDepthFeature(const CameraModel& camera, const Eigen::Vector2d& pixel,
-                                   double inverse_depth = 0.0, double sigma_inverse_depth = 0.0);
+                                   double inverse_depth = 0.0, double sigma_inverse_depth = 0.0,
+                                   double sigma_px = 0.0);
   /// New feature at a known place, independent of the rest of the state.
   FeatureId addPointFeature(const Eigen::Vector3d& position_world,
                             const Eigen::Matrix3d& covariance);

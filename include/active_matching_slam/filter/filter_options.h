@@ -9,15 +9,15 @@ struct FilterOptions {
   double sigma_acceleration_mps2 = 7.0;           ///< linear, per axis (eq. 3.6)
   double sigma_angular_acceleration_rps2 = 12.0;  ///< angular, per axis
   double sigma_px = 0.45;                         ///< measurement noise, per axis
-  double minimum_sigma_px = 0.1;                  ///< of matches that show less; see MatchNoise
-  double corner_wander_px = 0.04;                 ///< per axis and root of a radian; see Ekf
+  double minimum_sigma_px = 0.02;                 ///< of matches that show less; see MatchNoise
+  double corner_wander_px = 0.07;                 ///< per axis and root of a radian; see Ekf
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
   double initial_sigma_readout_s = 0.01;
-  double initial_sigma_focal = 0.01;  ///< these: see LensCorrection
-  double initial_sigma_radial = 0.02;
-  double initial_sigma_centre = 0.006;
+  double initial_sigma_focal = 0.003;  ///< these: see LensCorrection
+  double initial_sigma_radial = 0.006;
+  double initial_sigma_centre = 0.0018;
   double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
   double initial_sigma_inverse_depth = 0.5;  ///< infinity within 2 sigma (Civera 2008)
   double linearity_threshold = 0.02;         ///< inverse depth -> point below (Civera 2008)

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <vector>
 
 #include "active_matching_slam/filter/filter_options.h"
@@ -9,33 +8,57 @@
 namespace active_matching_slam {
 
 /// How much more or less noisy the matches of one feature are than most: some corners are cleaner
-/// than others, and where something near hides something far there is no point to be found. Over
-/// about the last hundred matches; one, until there are enough to tell.
+/// than others, and where something near hides something far there is no point to be found. By what
+/// is left between image and template, and by what updates leave over about the last hundred
+/// matches; like others, until there are enough to tell.
 class FeatureNoise {
  public:
+  /// `sigma_px` of a match as its image tells it (SearchMatch::sigma_px); 0 tells nothing.
+  void see(double sigma_px);
+
   /// `residual_px` as MatchNoise::learn() has it, `shown_px` > 0 what it returned for that frame.
   void learn(const Eigen::Vector2d& residual_px, double shown_px);
 
-  /// Standard deviation of this feature's matches, in that of most.
+  /// Standard deviation of this feature's matches as updates show it, in what was expected.
   double factor() const;
+
+  /// Average of what images told, as a standard deviation [px]; 0: nothing yet.
+  double seen_px() const;
 
  private:
   double sum_ = 0.0;    ///< of squared residuals per axis, in what their frames showed
   double count_ = 0.0;  ///< of matches
+  double seen_px2_ = 0.0;
+  int seen_ = 0;
 };
 
 /// The noise of matches as updates show it: what they leave between matches and map, by its median
-/// (so that the few that are wrong don't count), averaged over a second or two. It is for the
+/// (so that the few that are wrong don't count), averaged over half a second or so, and what each
+/// patch is off in its own way, which the map follows, so that nothing is left of it. It is for the
 /// update only; gates and mutual information keep FilterOptions::sigma_px, which must hold for what
 /// has not been matched yet.
 class MatchNoise {
  public:
   /// Nothing is known yet: it is taken to be FilterOptions::sigma_px.
-  void reset() { variance_px2_.reset(); }
+  void reset() { *this = MatchNoise(); }
 
-  /// `residuals_px`: each match fused, less the feature's projection after the update. Too few tell
-  /// nothing. Returns what they show, as a standard deviation per axis [px]; 0: nothing.
-  double learn(const FilterOptions& options, const std::vector<Eigen::Vector2d>& residuals_px);
+  /// `residuals_px`: each match fused, less the feature's projection after the update, over the
+  /// root of UpdateReport::noise_left and over likeMost() of its feature. Too few tell nothing.
+  /// Returns what they show, as a standard deviation per axis [px]; 0: nothing.
+  double learn(const std::vector<Eigen::Vector2d>& residuals_px);
+
+  /// How far matches moved since the image before [px]: the less, the longer what a patch is off in
+  /// its own way, by where between pixels it falls and how it is seen, stays the same. Too few tell
+  /// nothing.
+  void seeMotion(std::vector<double> motions_px);
+
+  /// What an image tells of its matches (SearchMatch::sigma_px, known ones). Too few tell nothing.
+  void see(std::vector<double> sigmas_px);
+
+  /// Standard deviation of a feature's matches in that of most, by what images told. What is left
+  /// between image and template says how much a patch is off by chance; where it is more than of
+  /// most, the patch is not the plane that it is taken for, and wanders by more than that.
+  double likeMost(const FeatureNoise& feature) const;
 
   /// Standard deviation per axis [px] for most matches, not above FilterOptions::sigma_px and,
   /// where that allows it, not below FilterOptions::minimum_sigma_px.
@@ -44,7 +67,10 @@ class MatchNoise {
   double sigma_px(const FilterOptions& options, const FeatureNoise& feature) const;
 
  private:
-  std::optional<double> variance_px2_;
+  double shown_px2_ = 0.0;    ///< average variance
+  double seen_px_ = 0.0;      ///< average of what images tell of most matches; 0: nothing yet
+  int updates_ = 0;           ///< that told something
+  double repetitions_ = 1.0;  ///< images with the same unseen error
 };
 
 }  // namespace active_matching_slam

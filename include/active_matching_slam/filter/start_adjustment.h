@@ -21,7 +21,8 @@ struct AdjustedStart {
     std::int64_t image = 0;
     Eigen::Isometry3d T_world_camera_before, T_world_camera_after;
   };
-  std::vector<Move> moves;  ///< of some of the images, ascending
+  std::vector<Move> moves;     ///< of some of the images, ascending
+  bool is_refinement = false;  ///< of a map that was known well: it stays much the same
 
   /// Pose of a camera near one of the moves' by the same correction.
   Eigen::Isometry3d corrected(std::int64_t image, const Eigen::Isometry3d& T_world_camera) const;
@@ -55,8 +56,8 @@ class StartAdjustment {
   /// Takes all lengths so far times `factor`, as the filter does when its scale becomes known.
   void rescale(double factor);
 
-  /// The adjusted state when it is time for one and the images leave no doubt. `model` as
-  /// calibrated; the readout is adjusted too.
+  /// The adjusted state when it was time for one at the image before and the images left no doubt.
+  /// `model` as calibrated; the readout is adjusted too.
   std::optional<AdjustedStart> adjust(const CameraModel& model, const Ekf& filter);
 
  private:
@@ -69,20 +70,37 @@ class StartAdjustment {
     std::vector<Eigen::Vector2d> speeds;
   };
 
+  /// One of the explanations of the images kept.
+  struct Reading {
+    Bundle bundle;
+    std::vector<FeatureId> ids;  ///< of its features, ascending
+    double parallax_px = 0.0;
+    std::vector<std::int64_t> images;  ///< of its cameras
+  };
+
   void thinOut();
   void rememberFeatures(const Ekf& filter);
   std::optional<double> parallax(const CameraModel& model);
   bool isTime(double parallax_px, double sigma_px);
+  std::vector<double> noiseOfFeatures(const std::vector<FeatureId>& ids) const;
   Bundle makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const;
+  BundleOptions optionsFor(const Ekf& filter) const;
+  std::optional<Reading> chooseReading(const CameraModel& model, const Ekf& filter,
+                                       double parallax_px) const;
+  Bundle continued(const Reading& chosen, const Bundle& believed,
+                   const std::vector<FeatureId>& ids) const;
+  std::optional<AdjustedStart> adjustTo(const CameraModel& model, const Ekf& filter,
+                                        const Reading& chosen);
   void adopt(const Bundle& reading, const std::vector<FeatureId>& ids, AdjustedStart* start);
 
   bool is_active_ = false;
   std::vector<Image> images_;  ///< the first, some between, the last two
   /// Ascending id: those of the filter, and what has left it but is in the images.
   std::vector<FeatureState> features_;
-  bool has_left_first_ = false;  ///< the last image shares too little with the first
-  bool is_unit_known_ = false;   ///< a scale was set
-  double unit_drift_ = 1.0;      ///< of the way's unit from the depths'
+  std::optional<Reading> chosen_;  ///< in the image before, to be adjusted now
+  bool has_left_first_ = false;    ///< the last image shares too little with the first
+  bool is_unit_known_ = false;     ///< a scale was set
+  double unit_drift_ = 1.0;        ///< of the way's unit from the depths'
   double least_motion_px_ = 1.0;
   double last_parallax_px_ = 0.0;  ///< when adjusted last; zero: has not been
   double next_parallax_px_ = 0.0;  ///< to be adjusted at

@@ -8,7 +8,8 @@
 
 namespace active_matching_slam {
 
-/// A point worth tracking.
+/// A point worth tracking. Near the corner found, the place which a template around it keeps best
+/// where the image is warped otherwise than foreseen: inclined or bent surfaces, hidden parts.
 struct Corner {
   Eigen::Vector2d pixel;  ///< whole numbers: the template there is the image itself, not resampled
   double response = 0.0;  ///< smaller eigenvalue of the structure tensor (Shi & Tomasi 1994)

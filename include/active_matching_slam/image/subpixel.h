@@ -12,10 +12,18 @@ namespace active_matching_slam {
 /// the middle one a local maximum), within [-0.5, 0.5] on each axis. Zero when the fit has no peak.
 Eigen::Vector2d paraboloidPeak(const float scores[9]);
 
+/// Where a template fits the image best.
+struct TemplateFit {
+  Eigen::Vector2d pixel;
+  /// Standard deviation per axis [px] that least squares makes of what is left between the two:
+  /// more than noise where the template is no longer what is seen.
+  double sigma_px = 0.0;
+};
+
 /// Aligns the template with the image by translation, gain and offset (inverse compositional
 /// Gauss-Newton), from `start` [px], which should be within a pixel of the truth. Empty when it
 /// does not converge, moves more than a pixel from `start`, or leaves the image.
-std::optional<Eigen::Vector2d> refineSubpixel(const cv::Mat& image, const Template& patch,
-                                              const Eigen::Vector2d& start);
+std::optional<TemplateFit> refineSubpixel(const cv::Mat& image, const Template& patch,
+                                          const Eigen::Vector2d& start);
 
 }  // namespace active_matching_slam

@@ -85,7 +85,8 @@ class FeatureMap {
   void learnSlope(const VisibleFeature& feature, const Template& expected, const cv::Mat& image,
                   const Eigen::Vector2d& pixel);
 
-  /// Learns how noisy the matches of a feature are: see FeatureNoise. Ignores unknown ids.
+  /// Learn how noisy the matches of a feature are: see FeatureNoise. Ignore unknown ids.
+  void seeNoise(FeatureId id, double sigma_px);
   void learnNoise(FeatureId id, const Eigen::Vector2d& residual_px, double shown_px);
 
   /// How many of these features will probably be matched, by their recent record.

@@ -19,6 +19,7 @@ struct SearchMatch {
   Eigen::Vector2d pixel;  ///< sub-pixel position [px]
   double score = 0.0;     ///< similarity, for images ZNCC in [-1, 1]
   int id = -1;            ///< stable within the feature; searches list matches by ascending id
+  double sigma_px = 0.0;  ///< per axis, as far as the image tells; 0: unknown
 };
 
 /// What one search brought.
