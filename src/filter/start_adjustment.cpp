@@ -391,9 +391,7 @@ Bundle StartAdjustment::continued(const Reading& chosen, const Bundle& believed,
           all.cameras[k].poseWorldCamera() * believed.cameras[k].poseWorldCamera().inverse();
       continue;
     }
-    const Eigen::Isometry3d T_world_camera = correction * believed.cameras[k].poseWorldCamera();
-    all.cameras[k].position_world = T_world_camera.translation();
-    all.cameras[k].q_world_camera = Eigen::Quaterniond(T_world_camera.linear()).normalized();
+    all.cameras[k].setPoseWorldCamera(correction * believed.cameras[k].poseWorldCamera());
   }
   return all;
 }

@@ -62,9 +62,7 @@ Bundle allImages(const Bundle& some, const Bundle& bundle) {
     const std::size_t there = k + (last - k) % stride(bundle);  // the next that `some` has
     const Eigen::Isometry3d correction =
         some.cameras[next].poseWorldCamera() * bundle.cameras[there].poseWorldCamera().inverse();
-    const Eigen::Isometry3d T_world_camera = correction * bundle.cameras[k].poseWorldCamera();
-    all.cameras[k].position_world = T_world_camera.translation();
-    all.cameras[k].q_world_camera = Eigen::Quaterniond(T_world_camera.linear()).normalized();
+    all.cameras[k].setPoseWorldCamera(correction * bundle.cameras[k].poseWorldCamera());
     if (k == there) ++next;
   }
   return all;

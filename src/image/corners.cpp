@@ -129,17 +129,16 @@ std::optional<Eigen::Vector2d> steadiestPoint(const cv::Mat& image, const Eigen:
 /// or not allowed.
 Corner settled(const Corner& corner, const cv::Mat& image, const cv::Rect& area,
                const std::vector<Eigen::Vector2d>& occupied, double squared_distance, int size) {
-  Corner settled = corner;
+  Corner moved = corner;
   for (int k = 0; k < kSettlings; ++k) {
-    const auto point = steadiestPoint(image, settled.pixel, size);
+    const auto point = steadiestPoint(image, moved.pixel, size);
     if (!point || !((*point - corner.pixel).norm() <= kFarthestPx)) return corner;
-    settled.pixel = {std::round(point->x()), std::round(point->y())};
+    moved.pixel = {std::round(point->x()), std::round(point->y())};
   }
   const bool is_inside =
-      area.contains({static_cast<int>(settled.pixel.x()), static_cast<int>(settled.pixel.y())});
-  return is_inside && squaredDistanceToNearest(settled.pixel, occupied) >= squared_distance
-             ? settled
-             : corner;
+      area.contains({static_cast<int>(moved.pixel.x()), static_cast<int>(moved.pixel.y())});
+  return is_inside && squaredDistanceToNearest(moved.pixel, occupied) >= squared_distance ? moved
+                                                                                          : corner;
 }
 
 }  // namespace

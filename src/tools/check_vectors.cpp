@@ -5,10 +5,10 @@
 #include <string>
 
 #include "active_matching_slam/matching/golden_vectors.h"
+#include "common/tool_main.h"
 
 namespace {
 
-constexpr int kFault = 2;
 constexpr const char* kUsage =
     "check_vectors FOLDER\n"
     "  Runs the matchers on every golden vector (*.json) of the folder. A line for each, the "
@@ -37,19 +37,16 @@ int main(int argc, char** argv) {
   }
   if (argument.empty() || argument.front() == '-') {
     std::cerr << kUsage;
-    return kFault;
+    return active_matching_slam::kToolFault;
   }
-  int passed = 0, failed = 0;
-  try {
+  return active_matching_slam::runTool("check_vectors", [&] {
+    int passed = 0, failed = 0;
     for (const std::string& path : active_matching_slam::goldenVectorsIn(argument)) {
       const auto report = active_matching_slam::checkGoldenVector(path);
       print(report);
       ++(report.passed() ? passed : failed);
     }
-  } catch (const std::exception& error) {
-    std::cerr << "check_vectors: " << error.what() << '\n';
-    return kFault;
-  }
-  std::cout << passed << " passed, " << failed << " failed\n";
-  return failed == 0 && passed > 0 ? 0 : 1;
+    std::cout << passed << " passed, " << failed << " failed\n";
+    return failed == 0 && passed > 0 ? 0 : 1;
+  });
 }

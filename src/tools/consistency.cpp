@@ -22,13 +22,13 @@
 #include "active_matching_slam/evaluation/run_summary.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "common/tool_main.h"
 
 namespace active_matching_slam {
 namespace {
 
 namespace po = boost::program_options;
 
-constexpr int kFault = 2;
 constexpr int kDegrees = 6;
 constexpr int kParts = 6;  ///< of the time, in the table
 
@@ -193,10 +193,6 @@ int run(int argc, char** argv) {
 }  // namespace active_matching_slam
 
 int main(int argc, char** argv) {
-  try {
-    return active_matching_slam::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "consistency: " << error.what() << "\n";
-    return active_matching_slam::kFault;
-  }
+  using namespace active_matching_slam;
+  return runTool("consistency", [&] { return run(argc, argv); });
 }

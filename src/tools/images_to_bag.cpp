@@ -18,6 +18,7 @@
 
 #include "active_matching_slam/camera/camera_calibration.h"
 #include "camera_bag_writer.h"
+#include "common/tool_main.h"
 
 namespace active_matching_slam {
 namespace {
@@ -302,12 +303,9 @@ bool parse(int argc, char** argv, Settings* settings) {
 
 int main(int argc, char** argv) {
   using namespace active_matching_slam;
-  try {
+  return runTool("images_to_bag", [&] {
     Settings settings;
     if (parse(argc, argv, &settings)) convert(settings);
     return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "images_to_bag: " << error.what() << "\n";
-    return 2;
-  }
+  });
 }

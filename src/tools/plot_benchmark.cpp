@@ -14,6 +14,7 @@
 #include <string>
 
 #include "active_matching_slam/evaluation/chart.h"
+#include "common/tool_main.h"
 
 namespace ams = active_matching_slam;
 namespace po = boost::program_options;
@@ -101,10 +102,5 @@ int plot(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return plot(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "plot_benchmark: " << error.what() << '\n';
-    return 2;
-  }
+  return ams::runTool("plot_benchmark", [&] { return plot(argc, argv); });
 }

@@ -14,14 +14,13 @@
 #include <vector>
 
 #include "active_matching_slam/evaluation/plot_canvas.h"
+#include "common/tool_main.h"
 
 namespace active_matching_slam {
 namespace {
 
 namespace po = boost::program_options;
 using Bins = std::vector<ReliabilityBin>;
-
-constexpr int kFault = 2;
 
 void printTable(const Bins& bins) {
   std::printf("%8s %12s %12s %10s\n", "frames", "mean weight", "share right", "sigma");
@@ -96,10 +95,6 @@ int run(int argc, char** argv) {
 }  // namespace active_matching_slam
 
 int main(int argc, char** argv) {
-  try {
-    return active_matching_slam::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "reliability: " << error.what() << "\n";
-    return active_matching_slam::kFault;
-  }
+  using namespace active_matching_slam;
+  return runTool("reliability", [&] { return run(argc, argv); });
 }

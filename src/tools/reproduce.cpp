@@ -3,7 +3,6 @@
 
 #include <sys/utsname.h>
 
-#include <algorithm>
 #include <boost/filesystem.hpp>
 #include <boost/program_options.hpp>
 #include <chrono>
@@ -18,14 +17,13 @@
 
 #include "active_matching_slam/evaluation/text_file.h"
 #include "active_matching_slam/experiments/experiment.h"
+#include "common/tool_main.h"
 
 namespace active_matching_slam {
 namespace {
 
 namespace fs = boost::filesystem;
 namespace po = boost::program_options;
-
-constexpr int kFault = 2;
 
 struct Arguments {
   std::string name, data, output;
@@ -126,20 +124,14 @@ void run(const Arguments& arguments) {
   std::printf("written to %s in %.0f s\n", arguments.output.c_str(), seconds());
 }
 
-int reproduce(int argc, char** argv) {
-  try {
-    const Arguments arguments = parseArguments(argc, argv);
-    if (!arguments.show_help) run(arguments);
-    return 0;
-  } catch (const std::exception& error) {
-    std::string line = error.what();
-    std::replace(line.begin(), line.end(), '\n', ' ');
-    std::cerr << "reproduce: " << line << "\n";
-    return kFault;
-  }
-}
-
 }  // namespace
 }  // namespace active_matching_slam
 
-int main(int argc, char** argv) { return active_matching_slam::reproduce(argc, argv); }
+int main(int argc, char** argv) {
+  using namespace active_matching_slam;
+  return runTool("reproduce", [&] {
+    const Arguments arguments = parseArguments(argc, argv);
+    if (!arguments.show_help) run(arguments);
+    return 0;
+  });
+}

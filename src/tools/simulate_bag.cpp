@@ -12,6 +12,7 @@
 #include "active_matching_slam/simulation/simulator.h"
 #include "camera_bag_writer.h"
 #include "common/progress_bar.h"
+#include "common/tool_main.h"
 
 namespace ams = active_matching_slam;
 namespace po = boost::program_options;
@@ -181,14 +182,10 @@ void simulate(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
+  return ams::runTool("simulate_bag", [&] {
     const Arguments arguments = parseArguments(argc, argv);
     if (arguments.show_list) printChoices();
-    if (arguments.show_help || arguments.show_list) return 0;
-    simulate(arguments);
+    if (!arguments.show_help && !arguments.show_list) simulate(arguments);
     return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "simulate_bag: " << error.what() << '\n';
-    return 2;
-  }
+  });
 }

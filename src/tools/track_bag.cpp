@@ -21,6 +21,7 @@
 #include "camera_bag_writer.h"
 #include "common/bag_image_source.h"
 #include "common/progress_bar.h"
+#include "common/tool_main.h"
 #include "tracked_bag_writer.h"
 
 namespace active_matching_slam {
@@ -28,8 +29,6 @@ namespace {
 
 namespace fs = boost::filesystem;
 namespace po = boost::program_options;
-
-constexpr int kFault = 2;
 
 struct Settings {
   std::string bag, image_topic, camera_info_topic, camera_info, config, known_target, matcher;
@@ -222,7 +221,7 @@ int trackBag(int argc, char** argv) {
   console_bridge::noOutputHandler();  // a fault is one line, and ours
   Settings settings;
   const po::options_description options = describeOptions(&settings);
-  try {
+  return runTool("track_bag", [&] {
     po::variables_map values;
     po::store(po::parse_command_line(argc, argv, options), values);
     if (values.count("help")) {
@@ -236,13 +235,7 @@ int trackBag(int argc, char** argv) {
       throw std::runtime_error("--features must be at least 1");
     run(settings);
     return 0;
-  } catch (const std::exception& error) {
-    std::string line = error.what();
-    for (char& c : line)
-      if (c == '\n' || c == '\r') c = ' ';
-    std::cerr << "track_bag: " << line << "\n";
-    return kFault;
-  }
+  });
 }
 
 }  // namespace

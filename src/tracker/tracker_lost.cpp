@@ -68,8 +68,7 @@ bool Tracker::Implementation::findInMap(const cv::Mat& image, TrackedFrame* fram
   const auto found = relocaliser_.find(camera_, image, filter_, map_);
   if (!found) return false;
   CameraState camera;
-  camera.position_world = found->T_world_camera.translation();
-  camera.q_world_camera = Eigen::Quaterniond(found->T_world_camera.linear()).normalized();
+  camera.setPoseWorldCamera(found->T_world_camera);
   double depth = 0.0;
   for (const FeatureMeasurement& inlier : found->inliers)
     depth += (filter_.find(inlier.id)->position() - camera.position_world).norm();

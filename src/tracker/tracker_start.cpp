@@ -85,8 +85,7 @@ bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, Tracked
     return false;
   }
   CameraState camera;
-  camera.position_world = found->T_world_camera.translation();
-  camera.q_world_camera = Eigen::Quaterniond(found->T_world_camera.linear()).normalized();
+  camera.setPoseWorldCamera(found->T_world_camera);
   // The pose is linearised at its solution and all but free: the points alone determine it below.
   const double distance = camera.position_world.norm() + 0.1;
   Eigen::Matrix<double, 12, 1> sigma;

@@ -26,6 +26,10 @@ struct CameraState {
     T_world_camera.translation() = position_world;
     return T_world_camera;
   }
+  void setPoseWorldCamera(const Eigen::Isometry3d& T_world_camera) {
+    position_world = T_world_camera.translation();
+    q_world_camera = Eigen::Quaterniond(T_world_camera.linear()).normalized();
+  }
 };
 
 /// Order of the camera's error state in every covariance: additive position, rotation as a
