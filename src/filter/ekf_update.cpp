@@ -60,11 +60,16 @@ UpdateReport Ekf::update(const CameraModel& camera,
   const std::size_t room = static_cast<std::size_t>(n) * (rows + kGaugeFreedoms);
   if (workspace_.size() < room) workspace_.resize(room);
   Eigen::Map<Eigen::MatrixXd> X(workspace_.data(), n, rows + kGaugeFreedoms);
-  MeasurementUpdate correction(camera, camera_, features_, covariance_, usable, X.leftCols(rows));
+  MeasurementUpdate correction(camera, camera_, features_, covariance_, usable,
+                               options_.calibration_share, X.leftCols(rows));
   if (!correction.solve(options_.update_iterations)) {
     report.healthy = false;
     return report;
   }
+  const auto calibration = [this] {
+    return covariance_.view().block<CameraError::kCalibrationSize, CameraError::kCalibrationSize>(
+        CameraError::kReadout, CameraError::kReadout);
+  };
   const std::vector<double> noise_left = correction.noiseLeft();
   for (std::size_t i = 0; i < given.size(); ++i) report.noise_left[given[i]] = noise_left[i];
   correction.finish();
@@ -72,8 +77,11 @@ UpdateReport Ekf::update(const CameraModel& camera,
   features_ = correction.features();
   report.nis = correction.nis();
   report.used = static_cast<int>(usable.size());
+  const Eigen::MatrixXd calibration_before = calibration();
   report.healthy = correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
                                      correction.gaugeCovariance(), rows, X);
+  const double not_made = 1.0 - options_.calibration_share;
+  calibration() += not_made * not_made * (calibration_before - calibration());
   limitInverseDepths();
   return report;
 }

@@ -45,6 +45,8 @@ void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("initial_sigma_focal", options.initial_sigma_focal);
   checkNotNegative("initial_sigma_radial", options.initial_sigma_radial);
   checkNotNegative("initial_sigma_centre", options.initial_sigma_centre);
+  check(options.calibration_share > 0.0 && options.calibration_share <= 1.0, "calibration_share",
+        options.calibration_share, "(0, 1]");
   checkPositive("initial_inverse_depth", options.initial_inverse_depth);
   checkPositive("initial_sigma_inverse_depth", options.initial_sigma_inverse_depth);
   checkNotNegative("linearity_threshold", options.linearity_threshold);

@@ -14,12 +14,13 @@ MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState
                                      const std::vector<FeatureState>& features,
                                      const CovarianceMatrix& covariance,
                                      const std::vector<UsableMeasurement>& measurements,
-                                     Eigen::Ref<Eigen::MatrixXd> X)
+                                     double calibration_share, Eigen::Ref<Eigen::MatrixXd> X)
     : model_(model),
       prior_camera_(camera),
       prior_features_(features),
       covariance_(covariance),
       measurements_(measurements),
+      calibration_share_(calibration_share),
       X_(X),
       camera_(camera),
       features_(features) {
@@ -78,6 +79,7 @@ bool MeasurementUpdate::step(bool first) {
   const Eigen::VectorXd weighted = llt_.solve(innovation);
   if (first) nis_ = innovation.dot(weighted);
   delta_.noalias() = X_ * weighted;
+  delta_.segment<CameraError::kCalibrationSize>(CameraError::kReadout) *= calibration_share_;
   if (!delta_.allFinite()) return false;
   camera_ = prior_camera_;
   features_ = prior_features_;

@@ -22,10 +22,11 @@ struct UsableMeasurement {
 /// for good.
 class MeasurementUpdate {
  public:
-  /// `X`: workspace, state size x 2 measurements.
+  /// `X`: workspace, state size x 2 measurements. `calibration_share`: how much of its correction
+  /// the calibration gets.
   MeasurementUpdate(const CameraModel& model, const CameraState& camera,
                     const std::vector<FeatureState>& features, const CovarianceMatrix& covariance,
-                    const std::vector<UsableMeasurement>& measurements,
+                    const std::vector<UsableMeasurement>& measurements, double calibration_share,
                     Eigen::Ref<Eigen::MatrixXd> X);
 
   /// False when S could not be factorised or the result is not finite: nothing is to be fused.
@@ -54,6 +55,7 @@ class MeasurementUpdate {
   const std::vector<FeatureState>& prior_features_;
   const CovarianceMatrix& covariance_;
   const std::vector<UsableMeasurement>& measurements_;
+  const double calibration_share_;
   Eigen::Ref<Eigen::MatrixXd> X_;  ///< P H^T, at the end P H^T U^-T with S = U U^T
 
   CameraState camera_;

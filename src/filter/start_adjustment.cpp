@@ -25,11 +25,11 @@ constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
-constexpr double kCleanestNoise = 0.5;
+constexpr double kCleanestNoise = 0.4;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
 /// What an adjustment takes for the noise of image points at least, with much parallax. While there
 /// is hardly any, the covariance, which is linear, says too little: with a parallax of this, twice.
-constexpr double kLeastNoisePx = 0.05, kNoiseDoublesAtPx = 1.0;
+constexpr double kLeastNoisePx = 0.038, kNoiseDoublesAtPx = 0.4;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 constexpr double kMostMisread = 0.1;        ///< of a way's square that a change of unit leaves
 

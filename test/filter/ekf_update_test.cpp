@@ -326,6 +326,43 @@ TEST_F(EkfUpdate, ACalibrationBeyondDoubtStaysAsItIs) {
   EXPECT_EQ(filter.camera().lens.centre, given.lens.centre);
 }
 
+TEST_F(EkfUpdate, TheCalibrationGetsItsShareOfACorrection) {
+  FilterOptions options = exampleOptions();
+  options.update_iterations = 1;
+  Ekf whole = exampleFilter(model_, 10, 6, CameraState(), options);
+  options.calibration_share = 0.25;
+  Ekf partial = exampleFilter(model_, 10, 6, CameraState(), options);
+  partial.restore(whole.camera(), whole.features(), whole.covariance(), whole.nextId());
+  const CameraState prior = whole.camera();
+  const Eigen::MatrixXd P = whole.covariance();
+  std::vector<FeatureMeasurement> measurements;
+  for (const FeatureState& feature : whole.features())
+    measurements.push_back(
+        {feature.id, seenBy(whole, model_, feature)->pixel + Eigen::Vector2d(0.8, -0.5), 0.0});
+  ASSERT_TRUE(whole.update(model_, measurements).healthy);
+  ASSERT_TRUE(partial.update(model_, measurements).healthy);
+
+  const auto calibrationOf = [](const CameraState& camera) {
+    CalibrationVector numbers;
+    numbers << camera.readout_s, camera.lens.focal, camera.lens.radial, camera.lens.centre;
+    return numbers;
+  };
+  const CalibrationVector correction = calibrationOf(whole.camera()) - calibrationOf(prior);
+  EXPECT_GT(correction.norm(), 1e-5);
+  EXPECT_LT(
+      relativeDifference(calibrationOf(partial.camera()) - calibrationOf(prior), 0.25 * correction),
+      1e-9);
+  EXPECT_EQ(partial.camera().position_world, whole.camera().position_world);
+  EXPECT_EQ(partial.camera().q_world_camera.coeffs(), whole.camera().q_world_camera.coeffs());
+  // What is not made stays as uncertain as it was: (1 - 0.25)^2 of the variance explained.
+  Eigen::MatrixXd expected = whole.covariance();
+  auto block = expected.block<5, 5>(CameraError::kReadout, CameraError::kReadout);
+  EXPECT_GT((P.block<5, 5>(CameraError::kReadout, CameraError::kReadout) - block).trace(), 1e-8);
+  block +=
+      0.5625 * (P.block<5, 5>(CameraError::kReadout, CameraError::kReadout) - block.eval()).eval();
+  EXPECT_LT(relativeDifference(partial.covariance(), expected), 1e-12);
+}
+
 TEST_F(EkfUpdate, ACameraThatMayHaveSlowedDownIsNotSureOfIt) {
   Ekf filter = exampleFilter(model_, 12);
   const CameraState before = filter.camera();

@@ -38,6 +38,7 @@ const DoubleOption kOptions[] = {
     {"initial_sigma_focal", &FilterOptions::initial_sigma_focal, true},
     {"initial_sigma_radial", &FilterOptions::initial_sigma_radial, true},
     {"initial_sigma_centre", &FilterOptions::initial_sigma_centre, true},
+    {"calibration_share", &FilterOptions::calibration_share, false},
     {"initial_inverse_depth", &FilterOptions::initial_inverse_depth, false},
     {"initial_sigma_inverse_depth", &FilterOptions::initial_sigma_inverse_depth, false},
     {"linearity_threshold", &FilterOptions::linearity_threshold, true},

@@ -89,7 +89,9 @@ class Ekf {
 
   PredictedMeasurements predictMeasurements(const CameraModel& camera,
                                             const std::vector<FeatureId>& ids) const;
-  /// Corrects the state. All measurements are fused at once.
+  /// Corrects the state. All measurements are fused at once. Of the calibration's correction only
+  /// FilterOptions::calibration_share is made, and its covariance says so: a partial update (Brink
+  /// 2017, Partial-Update Schmidt-Kalman Filter).
   UpdateReport update(const CameraModel& camera,
                       const std::vector<FeatureMeasurement>& measurements);
 

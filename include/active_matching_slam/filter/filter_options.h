@@ -10,7 +10,7 @@ struct FilterOptions {
   double sigma_angular_acceleration_rps2 = 12.0;  ///< angular, per axis
   double sigma_px = 0.45;                         ///< measurement noise, per axis
   double minimum_sigma_px = 0.02;                 ///< of matches that show less; see MatchNoise
-  double corner_wander_px = 0.07;                 ///< per axis and root of a radian; see Ekf
+  double corner_wander_px = 0.025;                ///< per axis and root of a radian; see Ekf
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
@@ -18,6 +18,9 @@ struct FilterOptions {
   double initial_sigma_focal = 0.003;  ///< these: see LensCorrection
   double initial_sigma_radial = 0.006;
   double initial_sigma_centre = 0.0018;
+  /// Of each correction of the calibration, how much is made: 1 where errors of matches are white;
+  /// those of images last, and teach less than so many of them should. See Ekf::update().
+  double calibration_share = 0.3;
   double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
   double initial_sigma_inverse_depth = 0.5;  ///< infinity within 2 sigma (Civera 2008)
   double linearity_threshold = 0.02;         ///< inverse depth -> point below (Civera 2008)

@@ -79,6 +79,10 @@ void visitOptions(Options& o, Visitor&& visit) {
           "trust in the calibration: of the image centre, per axis, relative to the focal length",
           true},
         o.filter.initial_sigma_centre, 0.0, 0.2);
+  visit(F{"filter/calibration_share",
+          "of each correction of the calibration, how much is made; less than 1 since errors last",
+          true},
+        o.filter.calibration_share, 1e-3, 1.0);
   visit(F{"filter/initial_inverse_depth",
           "prior of a new feature; fixes the map unit when scale is "
           "free [1/m]",
