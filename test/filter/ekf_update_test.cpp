@@ -342,11 +342,6 @@ TEST_F(EkfUpdate, TheCalibrationGetsItsShareOfACorrection) {
   ASSERT_TRUE(whole.update(model_, measurements).healthy);
   ASSERT_TRUE(partial.update(model_, measurements).healthy);
 
-  const auto calibrationOf = [](const CameraState& camera) {
-    CalibrationVector numbers;
-    numbers << camera.readout_s, camera.lens.focal, camera.lens.radial, camera.lens.centre;
-    return numbers;
-  };
   const CalibrationVector correction = calibrationOf(whole.camera()) - calibrationOf(prior);
   EXPECT_GT(correction.norm(), 1e-5);
   EXPECT_LT(

@@ -44,6 +44,12 @@ inline FilterOptions exampleOptions() {
   return options;
 }
 
+inline CalibrationVector calibrationOf(const CameraState& camera) {
+  CalibrationVector numbers;
+  numbers << camera.readout_s, camera.lens.focal, camera.lens.radial, camera.lens.centre;
+  return numbers;
+}
+
 class Random {
  public:
   explicit Random(unsigned seed) : engine_(seed) {}

@@ -129,7 +129,7 @@ TEST(MatchNoise, WhatDoesNotShowCountsMoreWhileTheImageHardlyMoves) {
   for (int k = 0; k < 100; ++k) noise.learn(gaussian(0.01, 50, &generator));
   noise.see(std::vector<double>(20, 0.05));
   const double usual = noise.sigma_px(options);
-  noise.seeMotion(std::vector<double>(20, 8.0));
+  noise.seeMotion(std::vector<double>(20, 20.0));
   EXPECT_EQ(noise.sigma_px(options), usual);
   noise.seeMotion(std::vector<double>(20, 0.5));
   const double slow = noise.sigma_px(options);

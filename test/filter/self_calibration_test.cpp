@@ -8,14 +8,6 @@
 namespace active_matching_slam {
 namespace {
 
-using Calibration = Eigen::Matrix<double, 5, 1>;  ///< in the order of CameraError
-
-Calibration calibrationOf(const CameraState& camera) {
-  Calibration numbers;
-  numbers << camera.readout_s, camera.lens.focal, camera.lens.radial, camera.lens.centre;
-  return numbers;
-}
-
 /// A hand that sways slowly and shakes its camera at up to 2 Hz and 1.5 rad/s.
 class ShakingHand {
  public:
@@ -117,7 +109,7 @@ TEST(SelfCalibration, FindsReadoutAndLens) {
     truth.readout_s = seed % 2 == 0 ? 0.025 : -0.025;  // from above and from below
     truth.lens = {0.005, 0.0, {0.0035, -0.0035}};
     const Ekf filter = learn(truth, 100 + seed);
-    const Calibration error = calibrationOf(filter.camera()) - calibrationOf(truth);
+    const CalibrationVector error = calibrationOf(filter.camera()) - calibrationOf(truth);
     // The filter's velocity is that of the last interval, half of it late: of a shaking camera the
     // readout comes out some per cent too small, and the rest can not be as good as it is said to
     // be.
