@@ -66,10 +66,6 @@ UpdateReport Ekf::update(const CameraModel& camera,
     report.healthy = false;
     return report;
   }
-  const auto calibration = [this] {
-    return covariance_.view().block<CameraError::kCalibrationSize, CameraError::kCalibrationSize>(
-        CameraError::kReadout, CameraError::kReadout);
-  };
   const std::vector<double> noise_left = correction.noiseLeft();
   for (std::size_t i = 0; i < given.size(); ++i) report.noise_left[given[i]] = noise_left[i];
   correction.finish();
@@ -77,11 +73,14 @@ UpdateReport Ekf::update(const CameraModel& camera,
   features_ = correction.features();
   report.nis = correction.nis();
   report.used = static_cast<int>(usable.size());
-  const Eigen::MatrixXd calibration_before = calibration();
+  auto calibration =
+      covariance_.view().block<CameraError::kCalibrationSize, CameraError::kCalibrationSize>(
+          CameraError::kReadout, CameraError::kReadout);
+  const auto calibration_before = calibration.eval();
   report.healthy = correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
                                      correction.gaugeCovariance(), rows, X);
   const double not_made = 1.0 - options_.calibration_share;
-  calibration() += not_made * not_made * (calibration_before - calibration());
+  calibration += not_made * not_made * (calibration_before - calibration);
   limitInverseDepths();
   return report;
 }
