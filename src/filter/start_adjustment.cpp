@@ -32,6 +32,8 @@ constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
 constexpr double kLeastNoisePx = 0.038, kNoiseDoublesAtPx = 0.4;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 constexpr double kMostMisread = 0.1;        ///< of a way's square that a change of unit leaves
+/// With so much parallax, a reading that leads by so many times what it needs to is settled.
+constexpr double kSettlingLead = 20.0, kSettlingParallaxPx = 2.0;
 
 const FeatureMeasurement* find(const std::vector<FeatureMeasurement>& measurements, FeatureId id) {
   const auto it =
@@ -164,21 +166,24 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
   }
 }
 
-/// Adjusts all of `reading`, first by the noise assumed and then by that which it shows, and leaves
-/// features that wander out of it, of `believed` and of `ids`. `options` keeps the lower noise.
-void adjustByItsNoise(const CameraModel& model, double parallax_px, BundleOptions* options,
-                      Bundle* reading, Bundle* believed, std::vector<FeatureId>* ids) {
-  options->sigma_inverse_depth =
-      std::max(options->sigma_inverse_depth,
-               kDepthSpread * medianDeviation(*reading, options->inverse_depth));
-  adjustBundle(model, *options, reading);
+/// The options for what is of such depths as `reading`.
+BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options) {
+  options.sigma_inverse_depth = std::max(
+      options.sigma_inverse_depth, kDepthSpread * medianDeviation(reading, options.inverse_depth));
+  return options;
+}
+
+/// Adjusts all of `reading` by the noise that it shows, and leaves features that wander out of it,
+/// of `believed` and of `ids`. `options` keeps the lower noise.
+void adjustByItsNoise(const CameraModel& model, double parallax_px, double noise_px,
+                      BundleOptions* options, Bundle* reading, Bundle* believed,
+                      std::vector<FeatureId>* ids) {
   // Corners where something near hides something far wander by less than would make them outliers;
   // most image points are much better than that.
-  const double scale = noiseOf(model, *reading);
   options->outlier_px =
-      std::clamp(kOutlierSigmas * scale, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
+      std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
   const double least_px = kLeastNoisePx * (1.0 + kNoiseDoublesAtPx / parallax_px);
-  options->sigma_px = std::min(options->sigma_px, std::max(scale, least_px));
+  options->sigma_px = std::min(options->sigma_px, std::max(noise_px, least_px));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);
 }
@@ -189,7 +194,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   is_active_ = true;
   images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
   features_.clear();
-  has_left_first_ = is_unit_known_ = false;
+  has_left_first_ = is_unit_known_ = is_settled_ = false;
   unit_drift_ = least_motion_px_ = 1.0;
   last_parallax_px_ = next_parallax_px_ = 0.0;
   age_ = last_age_ = 0;
@@ -355,6 +360,8 @@ BundleOptions StartAdjustment::optionsFor(const Ekf& filter) const {
 }
 
 /// What the filter believes and its opposites are told apart. Empty when none is clearly the best.
+/// Once that is settled, what it believes, adjusted by the noise assumed; empty when things move or
+/// matches lie.
 std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const CameraModel& model,
                                                                        const Ekf& filter,
                                                                        double parallax_px) const {
@@ -365,9 +372,16 @@ std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const Cam
   const BundleOptions options = optionsFor(filter);
   chooseUnit(options, &chosen.bundle);  // a known scale may have been set
   for (const Image& image : images_) chosen.images.push_back(image.index);
-  auto best = bestReading(model, options, chosen.bundle);
+  if (is_settled_) {
+    const double cost = adjustBundle(model, withDepthsOf(chosen.bundle, options), &chosen.bundle);
+    if (costsTooMuch(cost, chosen.bundle)) return std::nullopt;
+    chosen.noise_px = noiseOf(model, chosen.bundle);
+    return chosen;
+  }
+  auto best = bestReading(model, options, chosen.bundle, last_parallax_px_ == 0.0);
   if (!best) return std::nullopt;
-  chosen.bundle = std::move(*best);
+  chosen.bundle = std::move(best->bundle);
+  chosen.lead = best->lead;
   return chosen;
 }
 
@@ -401,11 +415,16 @@ std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model,
   std::vector<FeatureId> ids;
   Bundle believed = makeBundle(model, &ids);
   if (!isConnected(believed)) return std::nullopt;
-  BundleOptions options = optionsFor(filter);
   Bundle reading = believed;
-  chooseUnit(options, &reading);  // that of `chosen`
+  chooseUnit(optionsFor(filter), &reading);  // that of `chosen`
   reading = continued(chosen, reading, ids);
-  adjustByItsNoise(model, chosen.parallax_px, &options, &reading, &believed, &ids);
+  BundleOptions options = withDepthsOf(reading, optionsFor(filter));
+  double noise_px = chosen.noise_px;
+  if (noise_px == 0.0) {
+    adjustBundle(model, options, &reading);
+    noise_px = noiseOf(model, reading);
+  }
+  adjustByItsNoise(model, chosen.parallax_px, noise_px, &options, &reading, &believed, &ids);
 
   // Others have seen the way, so that its unit stays, as far as it was known.
   const double by_depths = depthFactor(believed, reading), by_way = wayFactor(believed, reading);
@@ -427,6 +446,7 @@ std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model,
   }
   start->is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
   adopt(reading, ids, &*start);
+  is_settled_ |= chosen.lead > kSettlingLead && chosen.parallax_px > kSettlingParallaxPx;
   unit_drift_ = drift;
   last_parallax_px_ = chosen.parallax_px;
   return start;

@@ -78,43 +78,50 @@ void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle) {
 }
 
 /// Image points in all images.
-std::size_t countPoints(const Bundle& bundle) {
+double countPoints(const Bundle& bundle) {
   std::size_t points = 0;
   for (const auto& observations : bundle.observations) points += observations.size();
-  return points;
+  return static_cast<double>(points);
 }
 
 }  // namespace
 
+bool costsTooMuch(double cost, const Bundle& bundle) {
+  return cost > kMostCostPerPoint * countPoints(bundle);
+}
+
 double noiseOf(const CameraModel& model, const Bundle& bundle) {
   std::vector<double> errors_px = featureErrors(model, bundle);
   errors_px.erase(std::remove(errors_px.begin(), errors_px.end(), 0.0), errors_px.end());
-  const double equations = 2.0 * static_cast<double>(countPoints(bundle));
+  const double equations = 2.0 * countPoints(bundle);
   const double unknowns = 3.0 * static_cast<double>(errors_px.size()) +
                           6.0 * static_cast<double>(bundle.cameras.size() - 1);
   const double freedom = std::max(equations - unknowns, 0.1 * equations);
   return medianOf(std::move(errors_px)) * std::sqrt(equations / freedom);
 }
 
-std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions& options,
-                                  const Bundle& believed) {
-  std::vector<Bundle> readings(2, someImages(believed));
-  flatten(model, options.inverse_depth, &readings[1]);
+std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleOptions& options,
+                                         const Bundle& believed, bool is_first) {
+  std::vector<Bundle> readings(1, someImages(believed));
+  if (is_first) {
+    readings.push_back(readings[0]);
+    flatten(model, options.inverse_depth, &readings[1]);
+  }
+  const std::size_t upright = readings.size();
   std::vector<double> costs;
   BundleOptions telling = options;
   telling.sigma_inverse_depth *= kDepthFreedom;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (i >= 2) {
+  for (std::size_t i = 0; i < 2 * upright; ++i) {
+    if (i >= upright) {
       if (i == 3 && isSameReading(readings[0], readings[1])) break;
-      readings.push_back(readings[i - 2]);
+      readings.push_back(readings[i - upright]);
       reverseDepths(model, &readings.back());
     }
     costs.push_back(adjustBundle(model, telling, &readings[i]));
     telling.hopeless_cost = std::min(telling.hopeless_cost, costs.back() + kHopelessCostGap);
   }
   auto best = std::min_element(costs.begin(), costs.end()) - costs.begin();
-  if (costs[best] > kMostCostPerPoint * static_cast<double>(countPoints(readings[best])))
-    return std::nullopt;
+  if (costsTooMuch(costs[best], readings[best])) return std::nullopt;
   // Images are often much better than assumed. By the noise assumed, one match that is wrong would
   // then weigh as much as all that are right; by their own, it does not.
   telling.sigma_px = std::clamp(noiseOf(model, readings[best]), kLeastNoise_px, options.sigma_px);
@@ -127,10 +134,12 @@ std::optional<Bundle> bestReading(const CameraModel& model, const BundleOptions&
     telling.hopeless_cost = std::min(telling.hopeless_cost, costs[i] + least_gap);
   }
   best = std::min_element(costs.begin(), costs.end()) - costs.begin();
+  double lead = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < costs.size(); ++i)
-    if (costs[i] < costs[best] + least_gap && !isSameReading(readings[i], readings[best]))
-      return std::nullopt;
-  return allImages(readings[best], believed);
+    if (!isSameReading(readings[i], readings[best]))
+      lead = std::min(lead, (costs[i] - costs[best]) / least_gap);
+  if (lead < 1.0) return std::nullopt;
+  return ChosenReading{allImages(readings[best], believed), lead};
 }
 
 }  // namespace active_matching_slam

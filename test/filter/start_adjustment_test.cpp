@@ -114,8 +114,8 @@ double medianInverseDepth(const AdjustedStart& adjusted) {
 }
 
 /// Length of the adjusted way by that of the true one.
-double scaleOf(const AdjustedStart& adjusted, const Bundle& truth) {
-  return adjusted.camera.position_world.norm() / truth.cameras.back().position_world.norm();
+double scaleOf(const AdjustedStart& adjusted, const CameraState& truth) {
+  return adjusted.camera.position_world.norm() / truth.position_world.norm();
 }
 
 TEST(StartAdjustment, FindsTheMoveThatTheFilterMissed) {
@@ -126,7 +126,7 @@ TEST(StartAdjustment, FindsTheMoveThatTheFilterMissed) {
   EXPECT_GT(cosineBetween(adjusted->camera.position_world, truth.cameras[11].position_world), 0.99);
   EXPECT_LT(adjusted->camera.q_world_camera.angularDistance(truth.cameras[11].q_world_camera),
             0.01);
-  const double scale = scaleOf(*adjusted, truth);
+  const double scale = scaleOf(*adjusted, truth.cameras.back());
   const Eigen::Vector3d velocity =
       30.0 * (truth.cameras[11].position_world - truth.cameras[10].position_world);
   EXPECT_LT((adjusted->camera.velocity_world / scale - velocity).norm(), 0.2 * velocity.norm());
@@ -240,7 +240,8 @@ TEST(StartAdjustment, AScaleThatIsSetMeanwhileHoldsForEarlierImagesToo) {
   // A patch taken from where that camera was believed to be is now where the camera was.
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
   T_world_camera.translation() = kFactor * believed;
-  const Eigen::Vector3d place = scaleOf(*adjusted, truth) * truth.cameras[kSet].position_world;
+  const Eigen::Vector3d place =
+      scaleOf(*adjusted, truth.cameras.back()) * truth.cameras[kSet].position_world;
   EXPECT_LT((adjusted->corrected(kSet, T_world_camera).translation() - place).norm(),
             0.1 * place.norm());
 }
@@ -304,6 +305,37 @@ TEST(StartAdjustment, TheUnitOfTheWayStays) {
   }
   EXPECT_NEAR(product / square, 1.0, 0.02);
   EXPECT_GT(cosineBetween(second->camera.position_world, truth.cameras[23].position_world), 0.99);
+}
+
+TEST(StartAdjustment, ASettledReadingIsAdjustedFurtherFromWhatTheFilterBelieves) {
+  // The first adjustment settles it: from the second on nothing else is tried.
+  constexpr double kStep = 0.003;
+  const Bundle truth = track(36, kStep, 8);
+  StartOfATrack start(truth);
+  std::vector<double> errors, sigmas;
+  for (const int last : {11, 23, 35}) {
+    const auto adjusted = start.adjustAfter(last);
+    ASSERT_TRUE(adjusted) << last;
+    EXPECT_GT(cosineBetween(adjusted->camera.position_world, truth.cameras[last].position_world),
+              0.99);
+    const double scale = scaleOf(*adjusted, truth.cameras[last]);
+    double squares = 0.0, variances = 0.0;
+    for (const FeatureState& feature : adjusted->features) {
+      const double by_truth =
+          feature.inverse_depth * scale / truth.features[start.featureOf(feature.id)].inverse_depth;
+      const int row = feature.offset + FeatureError::kInverseDepth;
+      squares += std::pow(by_truth - 1.0, 2);
+      variances += adjusted->covariance(row, row) / std::pow(feature.inverse_depth, 2);
+    }
+    errors.push_back(std::sqrt(squares / adjusted->features.size()));
+    sigmas.push_back(std::sqrt(variances / adjusted->features.size()));
+    start.filter().restore(adjusted->camera, adjusted->features, adjusted->covariance, 1000);
+  }
+  for (std::size_t i = 1; i < errors.size(); ++i) {
+    EXPECT_LT(errors[i], errors[i - 1]);
+    EXPECT_LT(sigmas[i], sigmas[i - 1]);
+    EXPECT_LT(errors[i], 2.0 * sigmas[i]);
+  }
 }
 
 TEST(StartAdjustment, EndsWhenTheFilterKnowsMore) {

@@ -31,10 +31,11 @@ struct AdjustedStart {
 /// Start with free scale. A filter linearises the first images about depths that it can only guess,
 /// and can't take back what it made of them: a turn read as a move, near and far exchanged. So the
 /// matches of the first images are kept, and when they show parallax, cameras and depths are
-/// adjusted together, from what the filter believes and from its opposites; the best, if it is
-/// clearly the best, becomes the filter's state. Repeated as parallax or time grow, also when the
-/// first image is out of sight, until depths are known well enough to be followed linearly, or the
-/// filter, which has seen every image, knows them clearly better than the images kept here tell.
+/// adjusted together, from what the filter believes and, until the images have clearly settled it,
+/// from its opposites; the best, if it is clearly the best, becomes the filter's state. Repeated as
+/// parallax or time grow, also when the first image is out of sight, until depths are known well
+/// enough to be followed linearly, or the filter, which has seen every image, knows them clearly
+/// better than the images kept here tell.
 class StartAdjustment {
  public:
   /// Starts anew with image `index`: `first` is where it shows the filter's features; its camera is
@@ -75,7 +76,9 @@ class StartAdjustment {
     Bundle bundle;
     std::vector<FeatureId> ids;  ///< of its features, ascending
     double parallax_px = 0.0;
+    double lead = 0.0;                 ///< see ChosenReading; zero: its opposites were not asked
     std::vector<std::int64_t> images;  ///< of its cameras
+    double noise_px = 0.0;             ///< zero: some of the images kept have not been adjusted yet
   };
 
   void thinOut();
@@ -100,6 +103,7 @@ class StartAdjustment {
   std::optional<Reading> chosen_;  ///< in the image before, to be adjusted now
   bool has_left_first_ = false;    ///< the last image shares too little with the first
   bool is_unit_known_ = false;     ///< a scale was set
+  bool is_settled_ = false;        ///< what the filter was given has no opposite any more
   double unit_drift_ = 1.0;        ///< of the way's unit from the depths'
   double least_motion_px_ = 1.0;
   double last_parallax_px_ = 0.0;  ///< when adjusted last; zero: has not been
