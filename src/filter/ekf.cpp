@@ -27,6 +27,7 @@ void Ekf::reset(const CameraState& camera, const MotionCovariance& covariance) {
   camera_.q_world_camera.normalize();
   features_.clear();
   covariance_.reset(CameraError::kSize);
+  impulse_.reset();
   auto P = covariance_.view();
   P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() =
       0.5 * (covariance + covariance.transpose());
@@ -53,12 +54,11 @@ void Ekf::predict(double interval_s) {
   MotionCovariance predicted = F * P_camera * F.transpose();
 
   // Impulses V = a dt, Omega = alpha dt enter like the velocities themselves (eq. 3.7).
-  Eigen::Matrix<double, 12, 6> G = F.rightCols<6>();
-  Eigen::Matrix<double, 6, 1> variance;
-  variance.head<3>().setConstant(std::pow(options_.sigma_acceleration_mps2 * interval_s, 2));
-  variance.tail<3>().setConstant(
-      std::pow(options_.sigma_angular_acceleration_rps2 * interval_s, 2));
-  predicted += G * variance.asDiagonal() * G.transpose();
+  impulse_ = Impulse{
+      interval_s, F.rightCols<6>(),
+      impulseVariance({options_.sigma_acceleration_mps2, options_.sigma_angular_acceleration_rps2},
+                      interval_s)};
+  predicted += impulse_->G * impulse_->variance.asDiagonal() * impulse_->G.transpose();
   P_camera = 0.5 * (predicted + predicted.transpose());
 
   auto motion_rest = P.topRightCorner(CameraError::kMotionSize, rest);
@@ -69,6 +69,13 @@ void Ekf::predict(double interval_s) {
         K * motion_rest.col(j).segment<3>(CameraError::kAngularVelocity);
   }
   P.bottomLeftCorner(rest, CameraError::kMotionSize) = motion_rest.transpose();
+}
+
+Eigen::Matrix<double, 6, 1> Ekf::impulseVariance(const Accelerations& sigmas, double interval_s) {
+  Eigen::Matrix<double, 6, 1> variance;
+  variance.head<3>().setConstant(std::pow(sigmas.linear_mps2 * interval_s, 2));
+  variance.tail<3>().setConstant(std::pow(sigmas.angular_rps2 * interval_s, 2));
+  return variance;
 }
 
 void Ekf::doubtVelocity(double share) {
@@ -86,6 +93,7 @@ void Ekf::rescale(double factor) {
     throw std::invalid_argument("scale factor = " + std::to_string(factor) +
                                 " is outside (0, inf)");
   }
+  impulse_.reset();
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(covariance_.size());
   scale.segment<3>(CameraError::kPosition).setConstant(factor);
   scale.segment<3>(CameraError::kVelocity).setConstant(factor);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -11,6 +12,7 @@ constexpr double kUnitTolerance = 1e-6;  ///< of lengths and angles that must be
 /// Correlations may exceed one by rounding only, which for all but certain rows is measured by the
 /// larger variance.
 constexpr double kCorrelationTolerance = 1e-3, kRounding = 1e-9;
+constexpr int kRowsAtOnce = 32;  ///< of a matrix, so that its columns and rows stay in the cache
 
 [[noreturn]] void refuse(const std::string& what) {
   throw std::invalid_argument("filter state: " + what);
@@ -55,12 +57,17 @@ void checkCovariance(const Eigen::MatrixXd& P, int size) {
   if (!(variance.minCoeff() >= 0.0)) refuse("the covariance has a negative variance");
   // Bounds by standard deviations: products of large variances would overflow.
   const Eigen::VectorXd sigma = variance.cwiseSqrt();
-  for (int j = 0; j < size; ++j) {
-    for (int i = j + 1; i < size; ++i) {
-      const double bound = sigma[i] * sigma[j];
-      const double slack = kCorrelationTolerance * bound + kRounding * (variance[i] + variance[j]);
-      if (std::abs(P(i, j) - P(j, i)) > slack) refuse("the covariance is not symmetric");
-      if (std::abs(P(i, j)) > bound + slack) refuse("the covariance holds a correlation beyond 1");
+  for (int begin = 0; begin < size; begin += kRowsAtOnce) {
+    const int end = std::min(begin + kRowsAtOnce, size);
+    for (int j = 0; j < end; ++j) {
+      for (int i = std::max(begin, j + 1); i < end; ++i) {
+        const double bound = sigma[i] * sigma[j];
+        const double slack =
+            kCorrelationTolerance * bound + kRounding * (variance[i] + variance[j]);
+        if (std::abs(P(i, j) - P(j, i)) > slack) refuse("the covariance is not symmetric");
+        if (std::abs(P(i, j)) > bound + slack)
+          refuse("the covariance holds a correlation beyond 1");
+      }
     }
   }
 }
@@ -88,6 +95,7 @@ void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& fe
   camera_ = camera;
   features_ = features;
   assignOffsets();
+  impulse_.reset();
   covariance_.reset(size);
   covariance_.view() = covariance;
   covariance_.mirrorLower();
@@ -100,6 +108,7 @@ void Ekf::relocateCamera(const CameraState& camera, const MotionCovariance& cova
   camera_.q_world_camera.normalize();
   camera_.readout_s = before.readout_s;
   camera_.lens = before.lens;
+  impulse_.reset();
   auto P = covariance_.view();
   const int rest = covariance_.size() - CameraError::kMotionSize;
   P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() =

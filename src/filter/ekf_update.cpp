@@ -36,6 +36,23 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
   return predicted;
 }
 
+Eigen::MatrixXd Ekf::innovationCovariance(const CameraModel& camera,
+                                          const PredictedMeasurements& predicted,
+                                          const Accelerations& sigmas) const {
+  if (!impulse_) return predicted.S;
+  const CameraModel lens = camera.corrected(camera_.lens);
+  MeasurementStack stack;
+  for (const FeatureId id : predicted.ids) {
+    const FeatureState& feature = *find(id);
+    stack.add(feature, *projectFeature(lens, camera_, feature));
+  }
+  const Eigen::MatrixXd A =
+      stack.cameraJacobian().leftCols<CameraError::kMotionSize>() * impulse_->G;
+  const Eigen::Matrix<double, 6, 1> more =
+      impulseVariance(sigmas, impulse_->interval_s) - impulse_->variance;
+  return predicted.S + A * more.asDiagonal() * A.transpose();
+}
+
 UpdateReport Ekf::update(const CameraModel& camera,
                          const std::vector<FeatureMeasurement>& measurements) {
   UpdateReport report;
@@ -69,6 +86,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
   const std::vector<double> noise_left = correction.noiseLeft();
   for (std::size_t i = 0; i < given.size(); ++i) report.noise_left[given[i]] = noise_left[i];
   correction.finish();
+  impulse_.reset();
   camera_ = correction.camera();
   features_ = correction.features();
   report.nis = correction.nis();

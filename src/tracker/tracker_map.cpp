@@ -42,14 +42,11 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
 /// neighbours. It is a prediction of its own, so that whether anyone looks at the graph changes no
 /// bit of the measurements.
 void Tracker::Implementation::observeStructure() {
-  if (prior_.ids.size() == visible_.size()) {
-    structure_.addFrame(prior_.ids, prior_.S);
-    return;
-  }
   std::vector<FeatureId> ids;
   for (const VisibleFeature& feature : visible_) ids.push_back(feature.id);
   const PredictedMeasurements predicted = filter_.predictMeasurements(camera_, ids);
-  structure_.addFrame(predicted.ids, predicted.S);
+  structure_.addFrame(predicted.ids, filter_.innovationCovariance(
+                                         camera_, predicted, options_.structure_accelerations));
 }
 
 /// Forgets what has left the map. The tree and the submaps of a large map are made anew every few

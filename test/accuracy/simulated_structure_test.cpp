@@ -139,26 +139,27 @@ KindOf bySide(const TrackedFrame& frame) {
 }
 
 // A turn of the camera moves near and far alike. So how much the two share is first of all a
-// matter of how much turning the filter allows for, against shifting.
+// matter of how much turning is expected, against shifting.
 TEST(TwoDepths, TheTableInFrontComesApartFromTheWallBehind) {
-  TrackerOptions shifting;  // 8 rad/s^2 and more seen from the table, which is half a metre off
-  shifting.filter.sigma_acceleration_mps2 = 4.0;
-  shifting.filter.sigma_angular_acceleration_rps2 = 3.0;
-  double margin_by_default = 0.0;  // mean over the runs
+  TrackerOptions turning;
+  turning.structure_accelerations = {7.0, 12.0};
+  double margin = 0.0, margin_turning = 0.0;  // means over the runs
   for (const StructureRun& run : twoDepthsRuns()) {
     SCOPED_TRACE(testing::PrintToString(run));
     const RenderedSequence sequence = render(run);
-    const auto shifted = lastFrameOf(sequence, shifting, Unit::kMetric);
     const auto usual = lastFrameOf(sequence, TrackerOptions(), Unit::kMetric);
-    ASSERT_TRUE(shifted->submaps);
+    const auto turned = lastFrameOf(sequence, turning, Unit::kMetric);
     ASSERT_TRUE(usual->submaps);
-    // Table 6.1, two submaps: 84.5 % against 50.8 %.
-    EXPECT_GT(expectToComeApart(run, *shifted, byDepth(*shifted)), 0.845 - 0.508);
-    const double by_default = expectToComeApart(run, *usual, byDepth(*usual));
-    EXPECT_GT(by_default, 0.2);
-    margin_by_default += by_default / static_cast<double>(twoDepthsRuns().size());
+    ASSERT_TRUE(turned->submaps);
+    const double share = 1.0 / static_cast<double>(twoDepthsRuns().size());
+    const double gained = expectToComeApart(run, *usual, byDepth(*usual));
+    EXPECT_GT(gained, 0.3);
+    margin += share * gained;
+    margin_turning += share * expectToComeApart(run, *turned, byDepth(*turned));
   }
-  EXPECT_GT(margin_by_default, 0.25);
+  // Table 6.1, two submaps: 84.5 % against 50.8 %.
+  EXPECT_GT(margin, 0.845 - 0.508);
+  EXPECT_GT(margin, margin_turning);
 }
 
 // The wall ahead is bare: there is nothing that is seen together with either side. Left and right
@@ -188,7 +189,7 @@ TEST_P(RenderedStructure, SubmapsPreserveMoreThanNaivePartsAtEveryLevel) {
                 level.preserved_chow_liu, level.preserved_naive);
     EXPECT_GT(level.preserved_chow_liu, level.preserved_naive) << level.submaps << " submaps";
   }
-  EXPECT_GE(intermediate, 2);
+  EXPECT_GE(intermediate, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, RenderedStructure,

@@ -387,5 +387,29 @@ TEST_F(EkfUpdate, IsTheSameBitForBitWhenRepeated) {
   EXPECT_EQ(run(), run());
 }
 
+TEST_F(EkfUpdate, InnovationCovarianceForOtherAccelerationsIsWhatTheyWouldHavePredicted) {
+  constexpr double kInterval = 0.04;
+  const Accelerations jerks{5.0, 8.0};
+  FilterOptions jerky_options = exampleOptions();
+  jerky_options.sigma_acceleration_mps2 = jerks.linear_mps2;
+  jerky_options.sigma_angular_acceleration_rps2 = jerks.angular_rps2;
+  Ekf calm = exampleFilter(model_, 5), jerky = calm;
+  jerky.setOptions(jerky_options);
+  calm.predict(kInterval);
+  jerky.predict(kInterval);
+  const PredictedMeasurements predicted = calm.predictMeasurements(model_, idsOf(calm));
+  const Eigen::MatrixXd expected = jerky.predictMeasurements(model_, predicted.ids).S;
+  ASSERT_GT(relativeDifference(predicted.S, expected), 0.1);
+  // But for what linearisation leaves out, which is that of the prediction made.
+  EXPECT_LT(relativeDifference(calm.innovationCovariance(model_, predicted, jerks), expected),
+            1e-3);
+
+  Random random(6);
+  calm.update(model_, noisyMeasurements(calm, model_, 1.0, random));
+  const PredictedMeasurements corrected = calm.predictMeasurements(model_, idsOf(calm));
+  EXPECT_EQ(calm.innovationCovariance(model_, corrected, jerks), corrected.S)
+      << "the accelerations since are no longer apart in the state";
+}
+
 }  // namespace
 }  // namespace active_matching_slam

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "active_matching_slam/camera/camera_model.h"
@@ -89,6 +90,11 @@ class Ekf {
 
   PredictedMeasurements predictMeasurements(const CameraModel& camera,
                                             const std::vector<FeatureId>& ids) const;
+  /// The same after all, S only, had the last predict() allowed for accelerations of `sigmas` in
+  /// place of the options'. `predicted`: what predictMeasurements() gave since.
+  Eigen::MatrixXd innovationCovariance(const CameraModel& camera,
+                                       const PredictedMeasurements& predicted,
+                                       const Accelerations& sigmas) const;
   /// Corrects the state. All measurements are fused at once. Of the calibration's correction only
   /// FilterOptions::calibration_share is made, and its covariance says so: a partial update (Brink
   /// 2017, Partial-Update Schmidt-Kalman Filter).
@@ -130,10 +136,21 @@ class Ekf {
                          const Eigen::MatrixXd& PL, int columns, Eigen::Ref<Eigen::MatrixXd> X);
   bool repairVariances(const Eigen::VectorXd& before);
 
+  /// Of the last prediction: unknown velocities of `variance` (linear, angular) moved the camera's
+  /// motion (CameraError order) by `G` times themselves.
+  struct Impulse {
+    double interval_s;
+    Eigen::Matrix<double, CameraError::kMotionSize, 6> G;
+    Eigen::Matrix<double, 6, 1> variance;
+  };
+  static Eigen::Matrix<double, 6, 1> impulseVariance(const Accelerations& sigmas,
+                                                     double interval_s);
+
   FilterOptions options_;
   CameraState camera_;
   std::vector<FeatureState> features_;  ///< ascending ids and offsets
   CovarianceMatrix covariance_;
+  std::optional<Impulse> impulse_;  ///< none when the state is no longer as predict() left it
   FeatureId next_id_ = 0;
   std::vector<double> workspace_;  ///< of the update; kept to save allocations
 };

@@ -4,6 +4,12 @@
 
 namespace active_matching_slam {
 
+/// Standard deviations per axis of the accelerations that a constant velocity leaves out (eq. 3.6).
+struct Accelerations {
+  double linear_mps2 = 0.0;
+  double angular_rps2 = 0.0;
+};
+
 /// Settings of the EKF. Units: m stands for the map unit when scale is free.
 struct FilterOptions {
   double sigma_acceleration_mps2 = 7.0;           ///< linear, per axis (eq. 3.6)

@@ -67,6 +67,8 @@ class MeasurementStack {
   int rows() const { return 2 * static_cast<int>(blocks_.size()); }
   Eigen::VectorXd pixels() const;
 
+  /// The camera's columns of H, rows() x CameraError::kSize.
+  Eigen::MatrixXd cameraJacobian() const;
   /// H X.
   Eigen::MatrixXd times(const Eigen::Ref<const Eigen::MatrixXd>& X) const;
   /// out = P H^T, state size x rows().
@@ -79,7 +81,6 @@ class MeasurementStack {
     int offset, size;
     FeatureProjection projection;
   };
-  Eigen::MatrixXd cameraJacobian() const;
   std::vector<Block> blocks_;
 };
 

@@ -32,6 +32,14 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.second_opinion);
   visit(F{"structure", "maintain the graph of mutual information and the submaps", true},
         o.structure);
+  visit(
+      F{"structure_acceleration_mps2",
+        "what that expects of the camera: linear acceleration, standard deviation per axis [m/s^2]",
+        true},
+      o.structure_accelerations.linear_mps2, 0.0, 1e3);
+  visit(F{"structure_angular_acceleration_rps2",
+          "the same, angular; the less, the more near and far come apart [rad/s^2]", true},
+        o.structure_accelerations.angular_rps2, 0.0, 1e3);
   visit(F{"known_points_search_px", "how far a known point may lie from its image_px [px]", false},
         o.known_points_search_px, 1.0, 200.0);
   visit(F{"max_frame_interval_s",

@@ -46,6 +46,10 @@ struct TrackerOptions {
   bool learn_rates = true;               ///< of each feature's true and false matches
   bool second_opinion = true;            ///< match again in other ways when few match
   bool structure = false;                ///< maintain the MI graph and the submaps
+  /// What the graph's mutual information expects of the camera from one image to the next. (Search
+  /// regions are for jerks too, and a jerk turns: that moves near and far alike, and drowns what
+  /// parts them.)
+  Accelerations structure_accelerations = {4.0, 3.0};
 };
 
 /// Throws std::invalid_argument with name, value and allowed range.
