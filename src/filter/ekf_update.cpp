@@ -9,7 +9,8 @@
 namespace active_matching_slam {
 
 PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
-                                               const std::vector<FeatureId>& ids) const {
+                                               const std::vector<FeatureId>& ids,
+                                               const std::optional<Accelerations>& instead) const {
   PredictedMeasurements predicted;
   const CameraModel lens = camera.corrected(camera_.lens);
   MeasurementStack stack;
@@ -32,25 +33,15 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
     predicted.S.block<2, 2>(2 * i, 2 * i) +=
         secondOrderNoise(stack.projection(i), relativeCovariance(feature, covariance_));
   }
+  if (instead && impulse_) {
+    const Eigen::MatrixXd A =
+        stack.cameraJacobian().leftCols<CameraError::kMotionSize>() * impulse_->G;
+    const Eigen::Matrix<double, 6, 1> more =
+        impulseVariance(*instead, impulse_->interval_s) - impulse_->variance;
+    predicted.S.triangularView<Eigen::Lower>() += A * (more.asDiagonal() * A.transpose());
+  }
   predicted.S.triangularView<Eigen::StrictlyUpper>() = predicted.S.transpose();
   return predicted;
-}
-
-Eigen::MatrixXd Ekf::innovationCovariance(const CameraModel& camera,
-                                          const PredictedMeasurements& predicted,
-                                          const Accelerations& sigmas) const {
-  if (!impulse_) return predicted.S;
-  const CameraModel lens = camera.corrected(camera_.lens);
-  MeasurementStack stack;
-  for (const FeatureId id : predicted.ids) {
-    const FeatureState& feature = *find(id);
-    stack.add(feature, *projectFeature(lens, camera_, feature));
-  }
-  const Eigen::MatrixXd A =
-      stack.cameraJacobian().leftCols<CameraError::kMotionSize>() * impulse_->G;
-  const Eigen::Matrix<double, 6, 1> more =
-      impulseVariance(sigmas, impulse_->interval_s) - impulse_->variance;
-  return predicted.S + A * more.asDiagonal() * A.transpose();
 }
 
 UpdateReport Ekf::update(const CameraModel& camera,

@@ -44,9 +44,9 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
 void Tracker::Implementation::observeStructure() {
   std::vector<FeatureId> ids;
   for (const VisibleFeature& feature : visible_) ids.push_back(feature.id);
-  const PredictedMeasurements predicted = filter_.predictMeasurements(camera_, ids);
-  structure_.addFrame(predicted.ids, filter_.innovationCovariance(
-                                         camera_, predicted, options_.structure_accelerations));
+  const PredictedMeasurements predicted =
+      filter_.predictMeasurements(camera_, ids, options_.structure_accelerations);
+  structure_.addFrame(predicted.ids, predicted.S);
 }
 
 /// Forgets what has left the map. The tree and the submaps of a large map are made anew every few

@@ -88,13 +88,11 @@ class Ekf {
   /// Turns features whose depth is well known into points by the linearity index; returns which.
   std::vector<FeatureId> convertToPoints();
 
-  PredictedMeasurements predictMeasurements(const CameraModel& camera,
-                                            const std::vector<FeatureId>& ids) const;
-  /// The same after all, S only, had the last predict() allowed for accelerations of `sigmas` in
-  /// place of the options'. `predicted`: what predictMeasurements() gave since.
-  Eigen::MatrixXd innovationCovariance(const CameraModel& camera,
-                                       const PredictedMeasurements& predicted,
-                                       const Accelerations& sigmas) const;
+  /// `instead`: S as if the last predict() had allowed for these accelerations in place of the
+  /// options' (until the state changes otherwise).
+  PredictedMeasurements predictMeasurements(
+      const CameraModel& camera, const std::vector<FeatureId>& ids,
+      const std::optional<Accelerations>& instead = std::nullopt) const;
   /// Corrects the state. All measurements are fused at once. Of the calibration's correction only
   /// FilterOptions::calibration_share is made, and its covariance says so: a partial update (Brink
   /// 2017, Partial-Update Schmidt-Kalman Filter).
