@@ -29,7 +29,8 @@ constexpr double kCleanestNoise = 0.4;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
 /// What an adjustment takes for the noise of image points at least, with much parallax. While there
 /// is hardly any, the covariance, which is linear, says too little: with a parallax of this, twice.
-constexpr double kLeastNoisePx = 0.038, kNoiseDoublesAtPx = 0.4;
+/// (By NEES over rendered runs.)
+constexpr double kLeastNoisePx = 0.05, kNoiseDoublesAtPx = 0.45;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 constexpr double kMostMisread = 0.1;        ///< of a way's square that a change of unit leaves
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
@@ -182,7 +183,7 @@ void adjustByItsNoise(const CameraModel& model, double parallax_px, double noise
   // most image points are much better than that.
   options->outlier_px =
       std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
-  const double least_px = kLeastNoisePx * (1.0 + kNoiseDoublesAtPx / parallax_px);
+  const double least_px = kLeastNoisePx * (1.0 + std::pow(kNoiseDoublesAtPx / parallax_px, 3));
   options->sigma_px = std::min(options->sigma_px, std::max(noise_px, least_px));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);

@@ -35,7 +35,10 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
     scale_source_ = ScaleSource::kFree;
   }
   visible_.clear();
-  frame->features_started += startFeatures(image, options_.map.features_per_frame, frame);
+  // Pose and covariance are told with respect to this image: it gives all the corners that it has,
+  // of which each look at it finds one a cell.
+  for (int started = 1; started > 0; frame->features_started += started)
+    started = startFeatures(image, options_.map.features_per_frame - map_.size(), frame);
   start_adjustment_.end();
   if (options_.known_points.empty()) {
     filter_.fixScale(kScaleSigma);

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "active_matching_slam/image/corners.h"
 #include "active_matching_slam/matching/matcher.h"
 #include "tracker/simulated_frames.h"
 
@@ -52,6 +53,24 @@ TEST(Tracker, FollowsASlowCameraToTheEnd) {
   const PathFit fit = fitPath(film, frames);
   RecordProperty("rms_mm", std::to_string(1e3 * fit.rms_m));
   EXPECT_LT(fit.rms_m, kShareOfPath * fit.path_m) << fit.path_m << " m long";
+}
+
+TEST(Tracker, TakesAllThatTheFirstImageHas) {
+  const TrackerOptions options;
+  Tracker tracker = slowTracker();
+  const cv::Mat& image = slowFilm().frames[0].image;
+  const auto frame = tracker.track(image, 0.0);
+  const auto corners = [&](const std::vector<Eigen::Vector2d>& occupied) {
+    return detectCorners(image, occupied, options.map.features_per_frame,
+                         options.map.minimum_distance_px, options.image);
+  };
+  const std::size_t started = frame->features.size();
+  EXPECT_GT(started, corners({}).size()) << "one look finds one a cell";
+  std::vector<Eigen::Vector2d> occupied;
+  for (const TrackedFeature& feature : frame->features)
+    occupied.push_back(*slowFilm().camera.project(feature.position_world));
+  EXPECT_TRUE(corners(occupied).empty());
+  EXPECT_EQ(frame->features_started, static_cast<int>(started));
 }
 
 TEST(Tracker, LearnsHowGoodMatchesAre) {

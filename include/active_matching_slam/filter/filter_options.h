@@ -21,12 +21,12 @@ struct FilterOptions {
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
   double initial_sigma_readout_s = 0.01;
-  double initial_sigma_focal = 0.003;  ///< these: see LensCorrection
-  double initial_sigma_radial = 0.006;
-  double initial_sigma_centre = 0.0018;
+  double initial_sigma_focal = 0.001;  ///< these: see LensCorrection
+  double initial_sigma_radial = 0.002;
+  double initial_sigma_centre = 0.0006;
   /// Of each correction of the calibration, how much is made: 1 where errors of matches are white;
   /// those of images last, and teach less than so many of them should. See Ekf::update().
-  double calibration_share = 0.3;
+  double calibration_share = 0.6;
   double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
   double initial_sigma_inverse_depth = 0.5;  ///< infinity within 2 sigma (Civera 2008)
   double linearity_threshold = 0.02;         ///< inverse depth -> point below (Civera 2008)
