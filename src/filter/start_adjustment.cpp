@@ -8,6 +8,7 @@
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/quantile.h"
 #include "adjusted_start.h"
+#include "start_bundle.h"
 #include "start_readings.h"
 
 namespace active_matching_slam {
@@ -18,21 +19,13 @@ constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 20.0;
 constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next
 /// Share of the points: where most are as far as each other, the few that are near tell the motion.
 constexpr double kAllButNear = 0.75;
-/// Prior of depths in the end, by how far apart they turned out to be (median).
-constexpr double kDepthSpread = 3.5;
 constexpr std::size_t kMostImages = 40;     ///< kept
 constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
-constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
-/// What an adjustment takes for the noise of image points at least, with much parallax. While there
-/// is hardly any, the covariance, which is linear, says too little: with a parallax of this, twice.
-/// (By NEES over rendered runs.)
-constexpr double kLeastNoisePx = 0.05, kNoiseDoublesAtPx = 0.45;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
-constexpr double kMostMisread = 0.1;        ///< of a way's square that a change of unit leaves
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
 constexpr double kSettlingLead = 20.0, kSettlingParallaxPx = 2.0;
 
@@ -63,38 +56,6 @@ FeatureState seenFromOrigin(const FeatureState& feature) {
       std::abs(m.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
   seen.tangent_world = (axis - m * m.dot(axis)).normalized();
   return seen;
-}
-
-/// Median distance of the inverse depths to one.
-double medianDeviation(const Bundle& bundle, double inverse_depth) {
-  std::vector<double> deviations;
-  for (const FeatureState& feature : bundle.features)
-    deviations.push_back(std::abs(feature.inverse_depth - inverse_depth));
-  return medianOf(std::move(deviations));
-}
-
-/// The factor by which the way of the cameras comes nearest to what it was. Zero when it was
-/// misread.
-double wayFactor(const Bundle& before, const Bundle& bundle) {
-  double product = 0.0, square = 0.0, square_before = 0.0;
-  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
-    const Eigen::Vector3d& was = before.cameras[k].position_world;
-    const Eigen::Vector3d& is = bundle.cameras[k].position_world;
-    product += is.dot(was);
-    square += is.squaredNorm();
-    square_before += was.squaredNorm();
-  }
-  if (!(product * product > (1.0 - kMostMisread) * square * square_before)) return 0.0;
-  return std::max(0.0, product / square);
-}
-
-/// The factor by which the median of the inverse depths stays.
-double depthFactor(const Bundle& before, const Bundle& bundle) {
-  std::vector<double> logarithms;
-  for (std::size_t i = 0; i < bundle.features.size(); ++i)
-    logarithms.push_back(
-        std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth));
-  return std::exp(medianOf(std::move(logarithms)));
 }
 
 /// Whether every image shows enough, and shares enough with the one before to hang together.
@@ -139,54 +100,6 @@ std::optional<double> parallaxBetween(const CameraModel& model,
       angles.push_back((R * ray->normalized() - pair.features[o.feature].bearing_world).norm());
   const double of_noise = std::sqrt(std::log(1.0 - kAllButNear) / std::log(0.5));  // Rayleigh's
   return quantileOf(std::move(angles), kAllButNear) / of_noise * model.calibration().fx;
-}
-
-/// Takes out features that are no points of the scene: their image points are outliers on the
-/// whole. Both bundles have the same features and observations.
-void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, Bundle* before,
-                   std::vector<FeatureId>* ids) {
-  const std::vector<double> errors = featureErrors(model, *bundle);
-  std::vector<int> place(errors.size(), -1);
-  int kept = 0;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (errors[i] > outlier_px) continue;
-    place[i] = kept;
-    bundle->features[kept] = bundle->features[i];
-    before->features[kept] = before->features[i];
-    (*ids)[kept++] = (*ids)[i];
-  }
-  bundle->features.resize(kept);
-  before->features.resize(kept);
-  ids->resize(kept);
-  for (auto& observations : bundle->observations) {
-    std::vector<BundleObservation> remaining;
-    for (const BundleObservation& o : observations)
-      if (place[o.feature] >= 0)
-        remaining.push_back({place[o.feature], o.pixel, o.d_calibration, o.noise});
-    observations.swap(remaining);
-  }
-}
-
-/// The options for what is of such depths as `reading`.
-BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options) {
-  options.sigma_inverse_depth = std::max(
-      options.sigma_inverse_depth, kDepthSpread * medianDeviation(reading, options.inverse_depth));
-  return options;
-}
-
-/// Adjusts all of `reading` by the noise that it shows, and leaves features that wander out of it,
-/// of `believed` and of `ids`. `options` keeps the lower noise.
-void adjustByItsNoise(const CameraModel& model, double parallax_px, double noise_px,
-                      BundleOptions* options, Bundle* reading, Bundle* believed,
-                      std::vector<FeatureId>* ids) {
-  // Corners where something near hides something far wander by less than would make them outliers;
-  // most image points are much better than that.
-  options->outlier_px =
-      std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
-  const double least_px = kLeastNoisePx * (1.0 + std::pow(kNoiseDoublesAtPx / parallax_px, 3));
-  options->sigma_px = std::min(options->sigma_px, std::max(noise_px, least_px));
-  adjustBundle(model, *options, reading);
-  dropWanderers(model, options->outlier_px, reading, believed, ids);
 }
 
 }  // namespace
@@ -348,18 +261,6 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   return adjustTo(model, filter, chosen);
 }
 
-BundleOptions StartAdjustment::optionsFor(const Ekf& filter) const {
-  BundleOptions options;
-  options.outlier_px = kOutlierSigmas * filter.options().sigma_px;
-  options.sigma_px = filter.options().sigma_px;
-  options.inverse_depth = filter.options().initial_inverse_depth;
-  options.sigma_inverse_depth = filter.options().initial_sigma_inverse_depth;
-  options.minimum_inverse_depth = filter.options().minimum_inverse_depth;
-  // So few images would bend the lens until depths fit their prior: it stays as calibrated.
-  options.sigma_calibration[0] = filter.options().initial_sigma_readout_s;
-  return options;
-}
-
 /// What the filter believes and its opposites are told apart. Empty when none is clearly the best.
 /// Once that is settled, what it believes, adjusted by the noise assumed; empty when things move or
 /// matches lie.
@@ -370,7 +271,7 @@ std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const Cam
   chosen.parallax_px = parallax_px;
   chosen.bundle = makeBundle(model, &chosen.ids);
   if (!isConnected(chosen.bundle)) return std::nullopt;
-  const BundleOptions options = optionsFor(filter);
+  const BundleOptions options = startOptions(filter.options());
   chooseUnit(options, &chosen.bundle);  // a known scale may have been set
   for (const Image& image : images_) chosen.images.push_back(image.index);
   if (is_settled_) {
@@ -417,9 +318,9 @@ std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model,
   Bundle believed = makeBundle(model, &ids);
   if (!isConnected(believed)) return std::nullopt;
   Bundle reading = believed;
-  chooseUnit(optionsFor(filter), &reading);  // that of `chosen`
+  chooseUnit(startOptions(filter.options()), &reading);  // that of `chosen`
   reading = continued(chosen, reading, ids);
-  BundleOptions options = withDepthsOf(reading, optionsFor(filter));
+  BundleOptions options = withDepthsOf(reading, startOptions(filter.options()));
   double noise_px = chosen.noise_px;
   if (noise_px == 0.0) {
     adjustBundle(model, options, &reading);

@@ -87,7 +87,6 @@ class StartAdjustment {
   bool isTime(double parallax_px, double sigma_px);
   std::vector<double> noiseOfFeatures(const std::vector<FeatureId>& ids) const;
   Bundle makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const;
-  BundleOptions optionsFor(const Ekf& filter) const;
   std::optional<Reading> chooseReading(const CameraModel& model, const Ekf& filter,
                                        double parallax_px) const;
   Bundle continued(const Reading& chosen, const Bundle& believed,

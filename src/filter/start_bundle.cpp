@@ -1,0 +1,110 @@
+#include "start_bundle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "active_matching_slam/filter/quantile.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// Prior of depths in the end, by how far apart they turned out to be (median).
+constexpr double kDepthSpread = 3.5;
+constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
+/// What an adjustment takes for the noise of image points at least, with much parallax. While there
+/// is hardly any, the covariance, which is linear, says too little: with a parallax of this, twice.
+/// (By NEES over rendered runs.)
+constexpr double kLeastNoisePx = 0.05, kNoiseDoublesAtPx = 0.45;
+constexpr double kMostMisread = 0.1;  ///< of a way's square that a change of unit leaves
+
+/// Median distance of the inverse depths to one.
+double medianDeviation(const Bundle& bundle, double inverse_depth) {
+  std::vector<double> deviations;
+  for (const FeatureState& feature : bundle.features)
+    deviations.push_back(std::abs(feature.inverse_depth - inverse_depth));
+  return medianOf(std::move(deviations));
+}
+
+/// Takes out features that are no points of the scene: their image points are outliers on the
+/// whole. Both bundles have the same features and observations.
+void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, Bundle* before,
+                   std::vector<FeatureId>* ids) {
+  const std::vector<double> errors = featureErrors(model, *bundle);
+  std::vector<int> place(errors.size(), -1);
+  int kept = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (errors[i] > outlier_px) continue;
+    place[i] = kept;
+    bundle->features[kept] = bundle->features[i];
+    before->features[kept] = before->features[i];
+    (*ids)[kept++] = (*ids)[i];
+  }
+  bundle->features.resize(kept);
+  before->features.resize(kept);
+  ids->resize(kept);
+  for (auto& observations : bundle->observations) {
+    std::vector<BundleObservation> remaining;
+    for (const BundleObservation& o : observations)
+      if (place[o.feature] >= 0)
+        remaining.push_back({place[o.feature], o.pixel, o.d_calibration, o.noise});
+    observations.swap(remaining);
+  }
+}
+
+}  // namespace
+
+BundleOptions startOptions(const FilterOptions& filter) {
+  BundleOptions options;
+  options.outlier_px = kOutlierSigmas * filter.sigma_px;
+  options.sigma_px = filter.sigma_px;
+  options.inverse_depth = filter.initial_inverse_depth;
+  options.sigma_inverse_depth = filter.initial_sigma_inverse_depth;
+  options.minimum_inverse_depth = filter.minimum_inverse_depth;
+  // So few images would bend the lens until depths fit their prior: it stays as calibrated.
+  options.sigma_calibration[0] = filter.initial_sigma_readout_s;
+  return options;
+}
+
+BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options) {
+  options.sigma_inverse_depth = std::max(
+      options.sigma_inverse_depth, kDepthSpread * medianDeviation(reading, options.inverse_depth));
+  return options;
+}
+
+void adjustByItsNoise(const CameraModel& model, double parallax_px, double noise_px,
+                      BundleOptions* options, Bundle* reading, Bundle* believed,
+                      std::vector<FeatureId>* ids) {
+  // Corners where something near hides something far wander by less than would make them outliers;
+  // most image points are much better than that.
+  options->outlier_px =
+      std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
+  const double least_px = kLeastNoisePx * (1.0 + std::pow(kNoiseDoublesAtPx / parallax_px, 3));
+  options->sigma_px = std::min(options->sigma_px, std::max(noise_px, least_px));
+  adjustBundle(model, *options, reading);
+  dropWanderers(model, options->outlier_px, reading, believed, ids);
+}
+
+double wayFactor(const Bundle& before, const Bundle& bundle) {
+  double product = 0.0, square = 0.0, square_before = 0.0;
+  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
+    const Eigen::Vector3d& was = before.cameras[k].position_world;
+    const Eigen::Vector3d& is = bundle.cameras[k].position_world;
+    product += is.dot(was);
+    square += is.squaredNorm();
+    square_before += was.squaredNorm();
+  }
+  if (!(product * product > (1.0 - kMostMisread) * square * square_before)) return 0.0;
+  return std::max(0.0, product / square);
+}
+
+double depthFactor(const Bundle& before, const Bundle& bundle) {
+  std::vector<double> logarithms;
+  for (std::size_t i = 0; i < bundle.features.size(); ++i)
+    logarithms.push_back(
+        std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth));
+  return std::exp(medianOf(std::move(logarithms)));
+}
+
+}  // namespace active_matching_slam

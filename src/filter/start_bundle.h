@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "active_matching_slam/filter/bundle_adjustment.h"
+#include "active_matching_slam/filter/filter_options.h"
+
+namespace active_matching_slam {
+
+/// By the noise assumed, and with the depths of new features.
+BundleOptions startOptions(const FilterOptions& filter);
+
+/// The options for what is of such depths as `reading`.
+BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options);
+
+/// Adjusts all of `reading` by the noise that it shows, and leaves features that wander out of it,
+/// of `believed` and of `ids`. `options` keeps the lower noise.
+void adjustByItsNoise(const CameraModel& model, double parallax_px, double noise_px,
+                      BundleOptions* options, Bundle* reading, Bundle* believed,
+                      std::vector<FeatureId>* ids);
+
+/// The factor by which the way of the cameras comes nearest to what it was. Zero when it was
+/// misread.
+double wayFactor(const Bundle& before, const Bundle& bundle);
+
+/// The factor by which the median of the inverse depths stays.
+double depthFactor(const Bundle& before, const Bundle& bundle);
+
+}  // namespace active_matching_slam
