@@ -75,7 +75,7 @@ void trackFrames(benchmark::State& state, const Case& c) {
   options.matcher = c.matcher;
   options.map.features_per_frame = c.features;
   options.map.maximum_features = std::max(options.map.maximum_features, c.features * 3 / 2);
-  options.matching.max_milliseconds = 20.0;  // as in the node
+  options.matching.modelled_time = false;  // as in the node
   if (c.exhaustive) {
     options.matching.latch_information_bits = 0.0;
     options.matching.max_milliseconds = 0.0;

@@ -9,12 +9,14 @@
 namespace active_matching_slam {
 namespace {
 
+constexpr double kNodeMs = 1e-5;  ///< modelled cost
+
 /// Depth-first branch and bound over the features in index order. The Cholesky factor of the paired
 /// features' covariance grows and shrinks with the branch; it depends on which features are paired,
 /// not on where, so all matches of a feature share its rows.
 class BranchAndBound {
  public:
-  BranchAndBound(const ProperPrior& prior, const SearchLedger& ledger,
+  BranchAndBound(const ProperPrior& prior, SearchLedger& ledger,
                  const std::vector<std::vector<int>>& gates, const MatchOptions& options)
       : prior_(prior), ledger_(ledger), gates_(gates), options_(options), size_(prior.size()) {
     for (int n = 1; n <= size_; ++n)
@@ -57,7 +59,7 @@ class BranchAndBound {
   bool isOutOfBudget() {
     if (options_.jcbb_max_nodes > 0 && nodes_ >= options_.jcbb_max_nodes) cut_short_ = true;
     if ((nodes_ & 255) == 0 && options_.max_milliseconds > 0.0 &&
-        ledger_.elapsedMilliseconds() >= options_.max_milliseconds)
+        ledger_.spentMilliseconds() >= options_.max_milliseconds)
       cut_short_ = true;
     return cut_short_;
   }
@@ -111,6 +113,7 @@ class BranchAndBound {
           level.chol_inverse * (ledger_.matches(feature)[slot(m)].pixel - expected);
       const double total = distance2 + y.squaredNorm();
       ++nodes_;
+      ledger_.charge(kNodeMs);
       if (total <= limits_[slot(depth)]) choices.push_back({total, m, y});
     }
     std::stable_sort(choices.begin(), choices.end(),
@@ -140,7 +143,7 @@ class BranchAndBound {
   }
 
   const ProperPrior& prior_;
-  const SearchLedger& ledger_;
+  SearchLedger& ledger_;
   const std::vector<std::vector<int>>& gates_;
   const MatchOptions& options_;
   const int size_;

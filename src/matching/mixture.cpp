@@ -9,6 +9,12 @@
 #include "slot.h"
 
 namespace active_matching_slam {
+namespace {
+
+constexpr double kTouchedMs = 6e-5;  ///< modelled cost of a child, for each feature that changes
+
+}  // namespace
+
 Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
                  std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
     : prior_(prior),
@@ -200,6 +206,7 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, const Child& born) {
   const Eigen::Vector2d weighted =
       child.joint->measuredPrecision() * (found - parent.mean[slot(f)]);
   const std::vector<int>& touched = child.joint->touched();
+  ledger_.charge(kTouchedMs * static_cast<double>(touched.size()));
   for (std::size_t i = 0; i < touched.size(); ++i)
     child.mean[slot(touched[i])].noalias() += child.joint->cross(i) * weighted;
   child.mean[slot(f)] = found;

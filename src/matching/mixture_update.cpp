@@ -16,6 +16,8 @@ constexpr double kLeastLikelihood = 1e-9;
 /// Logarithm of the odds that the better of two near matches is the true one, by the difference of
 /// their similarities.
 constexpr double kScoreCredit = 20.0;
+/// Modelled cost of weighing one Gaussian by what is known of a feature, and of each match.
+constexpr double kWeighingMs = 1e-3, kWeighingMatchMs = 2e-5;
 /// Dropped hypotheses that are kept for the recount, so many at most.
 constexpr std::size_t kMostAside = 32;
 
@@ -41,6 +43,7 @@ double Mixture::pixelMass(Hypothesis& h, int f) {
 /// 1 - A
 double Mixture::explained(Hypothesis& h, int f) {
   const std::vector<SearchMatch>& known = ledger_.matches(f);
+  ledger_.charge(kWeighingMs + kWeighingMatchMs * static_cast<double>(known.size()));
   const double searched_mass = pixelMass(h, f);
   const Eigen::Matrix2d covariance = h.covariance(f);
   double all = 0.0, foreign = 0.0;
@@ -99,6 +102,7 @@ void Mixture::updateThesis(int g, int c, MatchStep& step, std::vector<Child>& ch
   for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
     Hypothesis& h = hypotheses_[slot(k)];
     if (!(h.joint->marginal(f).determinant > 0.0)) continue;
+    ledger_.charge(kWeighingMs);
     const Eigen::Matrix2d covariance = h.covariance(f);
     double sum = 0.0;
     for (const int m : outcome.matches) {

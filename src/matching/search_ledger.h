@@ -29,6 +29,12 @@ class SearchLedger {
   double now() const { return clock_s_(); }
   double correlationSeconds() const { return correlation_s_; }
   double elapsedMilliseconds() const { return 1e3 * (now() - start_s_); }
+  /// Adds to the modelled time.
+  void charge(double milliseconds) { modelled_ms_ += milliseconds; }
+  /// What counts against the budget of time.
+  double spentMilliseconds() const {
+    return options_.modelled_time ? modelled_ms_ : elapsedMilliseconds();
+  }
   std::int64_t pixelsSearched() const { return pixels_; }
   /// Share used up of the options' budgets, of the tightest.
   double budgetUsed() const;
@@ -46,6 +52,7 @@ class SearchLedger {
   std::function<double()> clock_s_;
   double start_s_;
   double correlation_s_ = 0.0;
+  double modelled_ms_ = 0.0;
   int searches_ = 0;
   std::int64_t pixels_ = 0;
 };

@@ -15,6 +15,7 @@ TrackerOptions TrackingSession::demandedOptions() const {
   TrackerOptions options = options_;
   options.matching.keep_trace = options_.matching.keep_trace || trace_demanded_;
   options.structure = options_.structure || structure_demanded_;
+  options.matching.modelled_time = false;  // a node keeps up whatever machine it runs on
   return options;
 }
 

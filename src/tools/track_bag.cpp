@@ -95,12 +95,6 @@ TrackerOptions trackerOptionsOf(const Settings& settings) {
     options.map.maximum_features = std::max(options.map.maximum_features, 2 * settings.features);
   }
   for (const std::string& assignment : settings.set) setTrackerOption(assignment, &options);
-  // A budget of time would make the result depend on the machine. What it means for the choice of a
-  // matcher, which follows a model of the cost and no clock, stays.
-  if (options.matching.max_milliseconds > 0.0)
-    options.matching.auto_milliseconds =
-        std::min(options.matching.auto_milliseconds, options.matching.max_milliseconds);
-  options.matching.max_milliseconds = 0.0;
   checkTrackerOptions(options);
   return options;
 }

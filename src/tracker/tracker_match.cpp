@@ -104,12 +104,14 @@ bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& p
                                      ImageFeatureSearch& search, double share, double least,
                                      double chi2_per_degree, TrackedFrame* frame) {
   const std::int64_t pixels_before = frame->matching.statistics.pixels_searched;
-  const double ms_before = frame->matching.statistics.total_ms;
-  const double left = 1.0 - shareOfBudget(partOfBudget(1.0), pixels_before, ms_before);
+  const double total_before_ms = frame->matching.statistics.total_ms;
+  const double budget_before_ms = frame->matching.statistics.budget_ms;
+  const double left = 1.0 - shareOfBudget(partOfBudget(1.0), pixels_before, budget_before_ms);
   if (!(left > 0.0)) return false;
   MatchResult second = matcher.match(prior, search, partOfBudget(share * left));
   second.statistics.pixels_searched += pixels_before;
-  second.statistics.total_ms += ms_before;
+  second.statistics.total_ms += total_before_ms;
+  second.statistics.budget_ms += budget_before_ms;
   const bool is_better =
       second.statistics.matched >= least &&
       second.statistics.mahalanobis2 <= 2.0 * second.statistics.matched * chi2_per_degree;
@@ -118,6 +120,7 @@ bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& p
   } else {
     frame->matching.statistics.pixels_searched = second.statistics.pixels_searched;
     frame->matching.statistics.total_ms = second.statistics.total_ms;
+    frame->matching.statistics.budget_ms = second.statistics.budget_ms;
   }
   return is_better;
 }
@@ -179,7 +182,7 @@ MatchOptions Tracker::Implementation::partOfBudget(double share) const {
 
 /// Asks the matcher, and again when far fewer features matched than should have:
 /// - The same matcher under the motion of the image as a whole, for a camera that was jerked. Where
-///   the ellipses are wide from the start, that comes first, and the filter's own prior second.
+///   the ellipses are wide from the start, that comes first and holds for all.
 /// - Where structure repeats in gates as wide as the image, a sequential matcher can lose the true
 ///   hypothesis among hundreds of equals while all are still short, and be sure of a wrong one:
 ///   JCBB, which asks for the longest. Since that pairs whatever its test lets pass, it counts only
@@ -196,19 +199,19 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
   }
   auto guided = gatesPixels(prior_) > kWideGatesPx ? guidedPrior(image) : std::nullopt;
   const bool was_guided = guided.has_value();
-  frame->matching =
-      matcher_->match(was_guided ? *guided : prior_, search_, partOfBudget(kFirstShare));
+  const MeasurementPrior& prior = was_guided ? *guided : prior_;
+  frame->matching = matcher_->match(prior, search_, partOfBudget(kFirstShare));
   const double expected = map_.expectedMatches(candidates_);
   if (expected < 8.0) return;
   const auto isPoor = [&] {
     const MatchStatistics& s = frame->matching.statistics;
     return s.matched <= (s.ambiguous ? kPoorShareWhenAmbiguous : kPoorShare) * expectedOf(s);
   };
-  if (isPoor()) {
-    if (!was_guided) guided = guidedPrior(image);
+  if (isPoor() && !was_guided) {
+    guided = guidedPrior(image);
     if (guided) {
       second_search_.beginFrame(image, templates_);
-      if (askToo(*matcher_, was_guided ? prior_ : *guided, second_search_, kShareOfRest,
+      if (askToo(*matcher_, *guided, second_search_, kShareOfRest,
                  std::max(kClearlyMore * frame->matching.statistics.matched, kMajority * expected),
                  0.0, frame))
         std::swap(search_, second_search_);  // match indices belong to the search that found them
@@ -221,10 +224,10 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     const int matched = frame->matching.statistics.matched;
     if (isPoor())
       is_settled =
-          askToo(*longest_matcher_, prior_, search_, kShareOfRest,
+          askToo(*longest_matcher_, prior, search_, kShareOfRest,
                  std::max(1.0 * matched, kMajority * expected), kCloseChi2PerDegree, frame);
     if (!is_settled && frame->matching.statistics.matched <= kPoorShare * expected)
-      askToo(*consensus_matcher_, prior_, search_, 1.0,
+      askToo(*consensus_matcher_, prior, search_, 1.0,
              std::max(kClearlyMore * frame->matching.statistics.matched, kLeastShare * expected),
              kFarChi2PerDegree, frame);
   }

@@ -148,6 +148,27 @@ TEST_P(EveryMatcher, StopsAtTheBudgetOfTime) {
   EXPECT_GT(result.statistics.matched, 0);
 }
 
+TEST_P(EveryMatcher, StopsAtTheModelledBudgetAtTheSamePlaceWhateverTheClockSays) {
+  const SimulatedProblem problem = problemOf(30);
+  MatchOptions options;
+  options.modelled_time = true;
+  const MatchStatistics whole = matchWith(GetParam(), problem, options).statistics;
+  ASSERT_GT(whole.budget_ms, 0.0);
+  options.max_milliseconds = 0.5 * whole.budget_ms;
+  std::vector<MatchResult> results;
+  for (const double tick_s : {0.0, 1.0}) {
+    double now = 0.0;
+    options.clock_s = [&now, tick_s] { return now += tick_s; };
+    results.push_back(matchWith(GetParam(), problem, options));
+    const MatchStatistics& cut = results.back().statistics;
+    EXPECT_TRUE(cut.cut_short) << tick_s;
+    EXPECT_LT(cut.budget_ms, whole.budget_ms) << tick_s;
+    EXPECT_GT(cut.matched, 0) << tick_s;
+  }
+  EXPECT_EQ(results[0].match_of_feature, results[1].match_of_feature);
+  EXPECT_EQ(results[0].statistics.budget_ms, results[1].statistics.budget_ms);
+}
+
 INSTANTIATE_TEST_SUITE_P(Names, EveryMatcher, testing::ValuesIn(matcherNames()));
 
 class MixtureMatcher : public testing::TestWithParam<std::string> {};

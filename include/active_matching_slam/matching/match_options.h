@@ -51,6 +51,9 @@ struct MatchOptions {
   // Budget of a frame, which ends with the search that uses it up.
   std::int64_t max_pixels = 0;    ///< distinct pixels searched; 0: no limit
   double max_milliseconds = 0.0;  ///< 0: no limit
+  /// The budget's milliseconds come from a model of the work done and not from the clock: the same
+  /// result on every machine, every time.
+  bool modelled_time = false;
   /// auto: active is taken while its modelled cost is below this (and below max_milliseconds, if
   /// set), and beyond if chow_liu would not halve it, as with less than about 130 features. The
   /// model counts features and expected matches; no clock decides.

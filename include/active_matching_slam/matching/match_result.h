@@ -68,6 +68,7 @@ struct MatchStatistics {
   double mixture_ms = 0.0;
   double tree_ms = 0.0;
   double total_ms = 0.0;
+  double budget_ms = 0.0;  ///< what counts against the budget: as total_ms, or modelled
 };
 
 /// The outcome of a frame. Match indices point into FeatureSearch::matches(feature).

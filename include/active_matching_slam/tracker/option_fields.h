@@ -186,12 +186,13 @@ void visitOptions(Options& o, Visitor&& visit) {
         std::uint64_t{0}, std::uint64_t{1} << 62);
   visit(F{"matching/max_pixels", "distinct pixels searched in a frame; 0: no limit", true},
         o.matching.max_pixels, std::int64_t{0}, std::int64_t{1} << 40);
-  visit(F{"matching/max_milliseconds",
-          "time for matching a frame at 30 Hz, more in proportion at lower rates [ms]; 0: no "
-          "limit. track_bag, which "
-          "repeats bit for bit, has none",
-          true},
-        o.matching.max_milliseconds, 0.0, 1e6);
+  visit(
+      F{"matching/max_milliseconds",
+        "time for matching a frame at 30 Hz, more in proportion at lower rates [ms]; 0: no "
+        "limit. A node goes by the clock, track_bag by a model of the work, which repeats bit for "
+        "bit",
+        true},
+      o.matching.max_milliseconds, 0.0, 1e6);
   visit(F{"matching/jcbb_max_nodes", "jcbb: nodes visited in a frame; 0: no limit", true},
         o.matching.jcbb_max_nodes, std::int64_t{0}, std::int64_t{1} << 40);
   visit(F{"matching/jcbb_confidence", "jcbb: chi-square level of joint compatibility", true},

@@ -19,11 +19,14 @@ struct KnownPoint {
   cv::Mat template_image;      ///< optional 8-bit grey template, centre = the point
 };
 
-/// Matching for live use: stops asking for information that no longer pays, and bounds the mixture.
+/// Matching for live use: stops asking for information that no longer pays, and bounds the mixture
+/// and the time.
 inline MatchOptions liveMatchOptions() {
   MatchOptions options;
   options.latch_information_bits = 0.1;
   options.max_gaussians = 50;
+  options.max_milliseconds = 20.0;
+  options.modelled_time = true;
   options.merge_sigmas = 0.5;
   options.ambiguous_below_weight = 0.3;
   options.default_rates.true_positive = 0.8;
