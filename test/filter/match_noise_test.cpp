@@ -52,7 +52,7 @@ TEST(MatchNoise, HasWhatImagesTellAddedSinceUpdatesDoNotShowIt) {
   noise.see(std::vector<double>(7, 0.1));  // too few
   EXPECT_EQ(noise.sigma_px(options), shown);
   noise.see({0.01, 0.02, 0.1, 0.1, 0.1, 0.1, 0.1, 5.0, 9.0});
-  EXPECT_GT(noise.sigma_px(options), std::hypot(shown, 0.03));
+  EXPECT_GT(noise.sigma_px(options), std::hypot(shown, 0.015));
   EXPECT_LT(noise.sigma_px(options), std::hypot(shown, 0.12));
 }
 
