@@ -197,9 +197,9 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     frame->matching = matcher_->match(prior_, search_, partOfBudget(1.0));
     return;
   }
-  auto guided = gatesPixels(prior_) > kWideGatesPx ? guidedPrior(image) : std::nullopt;
-  const bool was_guided = guided.has_value();
-  const MeasurementPrior& prior = was_guided ? *guided : prior_;
+  const bool is_wide = gatesPixels(prior_) > kWideGatesPx;
+  const auto guided = is_wide ? guidedPrior(image) : std::nullopt;
+  const MeasurementPrior& prior = guided ? *guided : prior_;
   frame->matching = matcher_->match(prior, search_, partOfBudget(kFirstShare));
   const double expected = map_.expectedMatches(candidates_);
   if (expected < 8.0) return;
@@ -207,11 +207,10 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
     const MatchStatistics& s = frame->matching.statistics;
     return s.matched <= (s.ambiguous ? kPoorShareWhenAmbiguous : kPoorShare) * expectedOf(s);
   };
-  if (isPoor() && !was_guided) {
-    guided = guidedPrior(image);
-    if (guided) {
+  if (!is_wide && isPoor()) {
+    if (const auto jerked = guidedPrior(image)) {
       second_search_.beginFrame(image, templates_);
-      if (askToo(*matcher_, *guided, second_search_, kShareOfRest,
+      if (askToo(*matcher_, *jerked, second_search_, kShareOfRest,
                  std::max(kClearlyMore * frame->matching.statistics.matched, kMajority * expected),
                  0.0, frame))
         std::swap(search_, second_search_);  // match indices belong to the search that found them

@@ -58,7 +58,8 @@ struct MatchOptions {
   /// set), and beyond if chow_liu would not halve it, as with less than about 130 features. The
   /// model counts features and expected matches; no clock decides.
   double auto_milliseconds = 10.0;
-  /// Monotonic clock of the budget and of the reported durations, in seconds; empty: steady_clock.
+  /// Monotonic clock of the budget, unless that is modelled, and of the reported durations, in
+  /// seconds; empty: steady_clock.
   std::function<double()> clock_s;
 
   // jcbb
