@@ -17,9 +17,11 @@ using Eigen::Vector3f;
 constexpr int kTile = 16;         ///< side of the areas for which surfaces are sorted out
 constexpr int kBlock = 8;         ///< tiles a side of the areas sorted out first
 constexpr float kUnit = 8192.0f;  ///< stored value of radiance 1
-/// A rotated grid: its rays have four different offsets in u and in v, and are centred.
-constexpr double kPatternU[] = {-0.125, 0.125, 0.375, -0.375};
-constexpr double kPatternV[] = {-0.375, 0.375, -0.125, 0.125};
+/// A rotated grid: its rays have four different offsets in u and in v. Taken in turn over the
+/// exposure, first and last are opposite, and so on inwards: motion smears a point evenly to both
+/// sides of where it is in the middle of the exposure, whichever way it moves.
+constexpr double kPatternU[] = {-0.125, 0.375, -0.375, 0.125};
+constexpr double kPatternV[] = {-0.375, -0.125, 0.125, 0.375};
 
 Vector3d bearing(const CameraModel& camera, double u, double v) {
   const auto ray = camera.unproject(Vector2d(u, v));

@@ -98,7 +98,7 @@ int Simulator::samplesFor(double t_s) const {
   const double speed = truth.angular_velocity_camera.norm() +
                        truth.velocity_world.norm() / (2.0 * scene_.stage.size_m);
   const double blur_px = speed * focal * exposure_s;
-  return Renderer::kPattern * std::clamp(static_cast<int>(std::ceil(blur_px / 6.0)), 1, 4);
+  return Renderer::kPattern * std::clamp(static_cast<int>(std::ceil(blur_px / 3.0)), 1, 8);
 }
 
 void Simulator::renderLight(double t_s, cv::Mat& radiance) const {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <utility>
 
 #include "active_matching_slam/simulation/random.h"
 #include "active_matching_slam/simulation/simulator.h"
@@ -202,6 +203,48 @@ TEST(Renderer, BlurIsCentredOnTheMiddleOfTheExposure) {
   for (int x = 0; x < 320; ++x)
     slope += light.at<float>(48, x) > 0.14 && light.at<float>(48, x) < 0.86;
   EXPECT_NEAR(slope, 9, 3);
+}
+
+/// Mean and third central moment of the slope of row 48: of what a vertical edge is smeared to.
+std::pair<double, double> smear(const cv::Mat& light) {
+  double sum = 0.0, mean = 0.0, third = 0.0;
+  const auto slope = [&](int x) { return light.at<float>(48, x + 1) - light.at<float>(48, x); };
+  for (int x = 0; x + 1 < light.cols; ++x) {
+    sum += slope(x);
+    mean += slope(x) * (x + 0.5);
+  }
+  mean /= sum;
+  for (int x = 0; x + 1 < light.cols; ++x) third += slope(x) * std::pow(x + 0.5 - mean, 3);
+  return {mean, third / sum};
+}
+
+TEST(Renderer, BlurIsTheSameToBothSidesHoweverFewItsSamples) {
+  Scene scene;
+  cv::Mat edge(64, 1024, CV_32FC1, cv::Scalar(0.1));
+  edge.colRange(512, 1024).setTo(cv::Scalar(0.9));
+  scene.surfaces.push_back(facing(2.0, 8.0, 4.0, edge));
+  const CameraModel model = camera("none", 320, 96);
+  const Renderer renderer(model, scene);
+  constexpr int kShifts = 8;  // of the edge over a pixel: what pixels make of it averages out
+  for (const int samples : {4, 8, 16})
+    for (const double metres : {0.04, -0.04}) {  // 5 px over the exposure
+      double third = 0.0;
+      for (int shift = 0; shift < kShifts; ++shift) {
+        const double middle = 0.008 * shift / kShifts;
+        cv::Mat light;
+        renderer.render(
+            [&](int sample, double) {
+              Isometry3d pose = Isometry3d::Identity();
+              pose.translation().x() = middle + metres * ((sample + 0.5) / samples - 0.5);
+              return pose;
+            },
+            samples, light);
+        const auto [mean, its_third] = smear(light);
+        EXPECT_NEAR(mean, model.project(Vector3d(-middle, 0, 2.0))->x(), 0.01);
+        third += its_third / kShifts;
+      }
+      EXPECT_NEAR(third, 0.0, 0.05) << samples << " samples, " << metres << " m";
+    }
 }
 
 TEST(Renderer, RollingShutterGivesEveryRowItsPose) {
