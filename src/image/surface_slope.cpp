@@ -35,7 +35,7 @@ bool learnSlope(const cv::Mat& image, const Eigen::Vector2d& pixel, const Templa
   SampledWindow window;
   if (!window.sample(image, pixel, size)) return false;
 
-  const Eigen::Matrix2d source_per_pixel = view.affine.inverse();
+  const SourceOffset source_offset(view);
   const double mean = static_cast<double>(expected.sum) / (size * size);
   Rows rows(size * size, kUnknowns);
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostPixels, 1> wanted(size * size);
@@ -46,7 +46,7 @@ bool learnSlope(const cv::Mat& image, const Eigen::Vector2d& pixel, const Templa
       const double slope_v =
           0.5 * (at[i + SampledWindow::kStride] - at[i - SampledWindow::kStride]);
       const double along = slope_u * view.parallax_px.x() + slope_v * view.parallax_px.y();
-      const Eigen::Vector2d source = source_per_pixel * Eigen::Vector2d(i - half, j - half);
+      const Eigen::Vector2d source = source_offset(i - half, j - half);
       rows.row(row) << at[i] - mean, slope_u, slope_v, 1.0, along * source.x(), along * source.y();
       wanted[row] = expected.at(j, i) - mean;
     }

@@ -37,6 +37,22 @@ int samplesPerPixel(const Eigen::Matrix2d& source_per_pixel) {
   return std::clamp(static_cast<int>(std::lround(longest)), 1, 4);
 }
 
+/// Second derivatives of `source`, which takes an offset of the pixel now to an optional offset of
+/// the pixel at first sight and zero to zero, by differences as wide as a template. Zero where
+/// `source` is empty.
+template <typename Source>
+Eigen::Matrix<double, 2, 3> secondDerivatives(const Source& source) {
+  constexpr double h = 5.0;
+  const auto right = source({h, 0}), left = source({-h, 0});
+  const auto below = source({0, h}), above = source({0, -h});
+  const auto after = source({h, h}), before = source({-h, -h});
+  Eigen::Matrix<double, 2, 3> result = Eigen::Matrix<double, 2, 3>::Zero();
+  if (!right || !left || !below || !above || !after || !before) return result;
+  const Eigen::Vector2d along_u = *right + *left, along_v = *below + *above;
+  result << along_u, 0.5 * (*after + *before - along_u - along_v), along_v;
+  return result / (h * h);
+}
+
 }  // namespace
 
 Eigen::Vector4d homogeneousPosition(const FeatureState& feature) {
@@ -86,12 +102,35 @@ std::optional<PatchView> predictPatchView(const SourcePatch& patch, const Camera
   view.tangent_metric_px2 = (d_bearing_d_first.transpose() * d_bearing_d_first).inverse();
   view.affine = d_now_d_point * R_now_first * d_bearing_d_first +
                 view.parallax_px * patch.slope_per_px.transpose();
-  if (!view.pixel.allFinite() || !view.affine.allFinite() || !view.tangent_metric_px2.allFinite())
+  // Inverted, by Sherman and Morrison: b ~ R^T (b' (1 + m . t) - t (m . b')), m = R n.
+  const Eigen::Vector3d normal_now =
+      R_now_first * (*bearing + d_bearing_d_first * (view.tangent_metric_px2 * patch.slope_per_px));
+  const double facing = 1.0 + normal_now.dot(shift);
+  if (facing > 0.0)
+    view.bend_per_px = secondDerivatives([&](const Eigen::Vector2d& offset) {
+      std::optional<Eigen::Vector2d> source;
+      if (const auto ray = camera.unproject(view.pixel + offset))
+        source = camera.project(R_now_first.transpose() *
+                                (facing * *ray - normal_now.dot(*ray) * shift));
+      if (source) *source -= patch.pixel;
+      return source;
+    });
+  if (!view.pixel.allFinite() || !view.affine.allFinite() || !view.bend_per_px.allFinite() ||
+      !view.tangent_metric_px2.allFinite())
     return std::nullopt;
   view.scale = std::sqrt(std::abs(view.affine.determinant()));
   const Eigen::Vector3d first_ray = R_now_first * *bearing;
   view.view_angle_rad = std::atan2(first_ray.cross(point_now).norm(), first_ray.dot(point_now));
   return view;
+}
+
+SourceOffset::SourceOffset(const PatchView& view)
+    : linear_(view.affine.inverse()), bend_(view.bend_per_px) {}
+
+Eigen::Vector2d SourceOffset::reach(double half) const {
+  const double squared = half * half;
+  return linear_.cwiseAbs() * Eigen::Vector2d(half, half) +
+         bend_.cwiseAbs() * Eigen::Vector3d(0.5 * squared, squared, 0.5 * squared);
 }
 
 bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_size_px,
@@ -101,15 +140,15 @@ bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_
   if (template_size_px < 1 || template_size_px > Template::kMaximumSize || patch.image.empty() ||
       !(view.affine.determinant() > 1e-6))  // a mirrored or edge-on plane shows nothing
     return false;
-  const Eigen::Matrix2d source_per_pixel = view.affine.inverse();
+  const SourceOffset source_offset(view);
   const int half = template_size_px / 2;
-  const Eigen::Vector2d reach = source_per_pixel.cwiseAbs() * Eigen::Vector2d(half, half);
+  const Eigen::Vector2d reach = source_offset.reach(half);
   const Eigen::Vector2d last(patch.image.cols - 0.5, patch.image.rows - 0.5);
   if (!((patch.center - reach).minCoeff() >= -0.5) ||
       !((last - patch.center - reach).minCoeff() >= 0.0))
     return false;
 
-  const int samples = samplesPerPixel(source_per_pixel);
+  const int samples = samplesPerPixel(source_offset.linear());
   const double step = 1.0 / samples, first = 0.5 * (step - 1.0);
   std::uint8_t* pixel = result->pixels.data();
   for (int dv = -half; dv <= half; ++dv) {
@@ -117,8 +156,8 @@ bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_
       double total = 0.0;
       for (int j = 0; j < samples; ++j)
         for (int i = 0; i < samples; ++i) {
-          const Eigen::Vector2d offset(du + first + i * step, dv + first + j * step);
-          const Eigen::Vector2d source = patch.center + source_per_pixel * offset;
+          const Eigen::Vector2d source =
+              patch.center + source_offset(du + first + i * step, dv + first + j * step);
           total += sample(patch.image, source.x(), source.y());
         }
       const double value = std::clamp(total * step * step, 0.0, 255.0);

@@ -14,8 +14,13 @@ struct FeatureState;
 
 /// How a source patch should look from the present camera.
 struct PatchView {
-  Eigen::Vector2d pixel;   ///< where the patch's centre projects now [px]
-  Eigen::Matrix2d affine;  ///< d(pixel now) / d(pixel at first sight) at the centre
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< where the patch's centre projects now [px]
+  /// d(pixel now) / d(pixel at first sight) at the centre
+  Eigen::Matrix2d affine = Eigen::Matrix2d::Identity();
+  /// Second derivatives of the pixel at first sight by u u, u v and v v of the pixel now, at the
+  /// centre [1/px]: perspective and lens bend a patch that has moved across the image, and all of
+  /// them the same way.
+  Eigen::Matrix<double, 2, 3> bend_per_px = Eigen::Matrix<double, 2, 3>::Zero();
   /// d(affine) / d(slope of the patch): what the way of the camera does to one relative inverse
   /// depth [px]; affine = affine without slope + parallax_px slope_per_px^T.
   Eigen::Vector2d parallax_px = Eigen::Vector2d::Zero();
@@ -29,14 +34,30 @@ struct PatchView {
 /// For inverse depth (rho * anchor + m, rho), which stays finite as rho -> 0.
 Eigen::Vector4d homogeneousPosition(const FeatureState& feature);
 
-/// View of a locally planar patch of the slope known. The homography R - t n^T / d between bearings
-/// is exact; together with both lens mappings it is linearised at the centre, which over an 11 x 11
-/// template is off by some hundredths of a pixel at its corners. Works for points at infinity
-/// (rotation only). Empty when the point is behind a camera, at a camera's centre, outside the lens
-/// model, or not finite.
+/// View of a locally planar patch of the slope known: the homography R - t n^T / d between bearings
+/// and both lens mappings, to second order about the centre. Works for points at infinity (rotation
+/// only). Empty when the point is behind a camera, at a camera's centre, outside the lens model, or
+/// not finite.
 std::optional<PatchView> predictPatchView(const SourcePatch& patch, const CameraModel& camera,
                                           const Eigen::Isometry3d& T_world_camera_now,
                                           const Eigen::Vector4d& point_world_homogeneous);
+
+/// Takes an offset from the feature in the present image to that in the first one [px].
+class SourceOffset {
+ public:
+  explicit SourceOffset(const PatchView& view);
+  Eigen::Vector2d operator()(double u, double v) const {
+    return linear_ * Eigen::Vector2d(u, v) +
+           bend_ * Eigen::Vector3d(0.5 * u * u, u * v, 0.5 * v * v);
+  }
+  /// Offsets of at most `half` on both axes stay within this on both axes.
+  Eigen::Vector2d reach(double half) const;
+  const Eigen::Matrix2d& linear() const { return linear_; }
+
+ private:
+  Eigen::Matrix2d linear_;
+  Eigen::Matrix<double, 2, 3> bend_;
+};
 
 /// Resamples the source patch as `view` expects it (cubic interpolation; averaged where the patch
 /// shrinks), with the feature at the centre of the template's middle pixel. False (and `result`
