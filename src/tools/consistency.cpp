@@ -20,6 +20,7 @@
 
 #include "active_matching_slam/evaluation/chart.h"
 #include "active_matching_slam/evaluation/run_summary.h"
+#include "active_matching_slam/simulation/random.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
 #include "common/tool_main.h"
@@ -35,6 +36,7 @@ constexpr int kParts = 6;  ///< of the time, in the table
 struct Arguments {
   SimulatorOptions simulator;
   int runs = 30, threads = 2;
+  bool draw_calibration = false;
   std::string output;
 };
 
@@ -44,10 +46,32 @@ struct Run {
   double path_m = 0.0;
 };
 
-Run trackRun(SimulatorOptions options, int index) {
+/// The calibration as somebody might have measured it: off by errors drawn from the filter's prior.
+CameraModel drawCalibration(const CameraModel& camera, const FilterOptions& options,
+                            std::uint64_t seed) {
+  Random random = Random(seed).fork(0x43414C49);
+  const auto normal = [&] {  // Box and Muller
+    const double length = std::sqrt(-2.0 * std::log(1.0 - random.uniform()));
+    return length * std::cos(2.0 * M_PI * random.uniform());
+  };
+  CameraCalibration c = camera.calibration();
+  const double larger = std::exp(options.initial_sigma_focal * normal());
+  c.cx += options.initial_sigma_centre * c.fx * normal();
+  c.cy += options.initial_sigma_centre * c.fy * normal();
+  c.fx *= larger;
+  c.fy *= larger;
+  return CameraModel(c);
+}
+
+Run trackRun(const Arguments& arguments, int index) {
+  SimulatorOptions options = arguments.simulator;
   options.seed += static_cast<std::uint64_t>(index);
   Simulator simulator(options);
-  Tracker tracker(simulator.camera(), TrackerOptions());
+  const TrackerOptions defaults;
+  Tracker tracker(arguments.draw_calibration
+                      ? drawCalibration(simulator.camera(), defaults.filter, options.seed)
+                      : simulator.camera(),
+                  defaults);
   std::vector<FrameRecord> records;
   RunTruth truth;
   truth.simulated = true;
@@ -64,7 +88,7 @@ std::vector<Run> trackRuns(const Arguments& arguments) {
   std::atomic<int> next{0};
   const auto work = [&] {
     for (int i = next++; i < arguments.runs; i = next++) {
-      runs[i] = trackRun(arguments.simulator, i);
+      runs[i] = trackRun(arguments, i);
       std::fprintf(stderr, "run %d of %d\n", i + 1, arguments.runs);
     }
   };
@@ -152,8 +176,6 @@ void write(const std::vector<double>& mean, const ChiSquareBounds& bounds,
 int run(int argc, char** argv) {
   Arguments arguments;
   SimulatorOptions& s = arguments.simulator;
-  s.width = 320;
-  s.height = 240;
   po::options_description options("consistency [options]", 100);
   auto add = options.add_options();
   add("help,h", "this text");
@@ -165,6 +187,9 @@ int run(int argc, char** argv) {
   add("seed", po::value(&s.seed)->default_value(s.seed), "of the first run; the others follow");
   add("runs", po::value(&arguments.runs)->default_value(arguments.runs), "1 to 1000");
   add("threads", po::value(&arguments.threads)->default_value(arguments.threads), "1 to 64");
+  add("draw-calibration", po::bool_switch(&arguments.draw_calibration),
+      "track with a focal length and an image centre that are off by errors drawn from what the "
+      "filter expects of them; else they are exact, and poses err less than it says");
   add("output", po::value(&arguments.output), "folder for consistency.csv and consistency.png");
   po::variables_map values;
   po::store(po::parse_command_line(argc, argv, options), values);

@@ -41,6 +41,16 @@ TEST(ConsistencyTool, PrintsATableAndWritesARowForEachFrame) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(ConsistencyTool, DrawsCalibrationsThatAreOff) {
+  const std::string run = "--runs 1 --seconds 2 --width 160 --height 120";
+  std::string exact, drawn, again;
+  ASSERT_EQ(runConsistency(run, &exact), 0) << exact;
+  ASSERT_EQ(runConsistency(run + " --draw-calibration", &drawn), 0) << drawn;
+  ASSERT_EQ(runConsistency(run + " --draw-calibration", &again), 0) << again;
+  EXPECT_NE(exact, drawn);
+  EXPECT_EQ(drawn, again);
+}
+
 TEST(ConsistencyTool, SaysWhatIsOutOfRange) {
   std::string output;
   EXPECT_EQ(runConsistency("--runs 0", &output), 2);
