@@ -16,8 +16,8 @@ constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once t
 /// What a patch is off in its own way, in what images tell of it, and the motion of the image after
 /// which it is another: it is weighed as white noise of so many times the variance as images show
 /// the same. (By NEES over rendered runs.)
-constexpr double kUnseen = 0.2;
-constexpr double kFreshPx = 9.0;
+constexpr double kUnseen = 0.7;
+constexpr double kFreshPx = 2.0;
 constexpr double kMostRepetitions = 50.0;
 /// Power of what images tell by which corners wander more. (By the same.)
 constexpr double kWanderByMisfit = 2.0;

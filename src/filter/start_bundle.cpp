@@ -16,7 +16,7 @@ constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
 /// What an adjustment takes for the noise of image points at least, with much parallax. While there
 /// is hardly any, the covariance, which is linear, says too little: with a parallax of this, twice.
 /// (By NEES over rendered runs.)
-constexpr double kLeastNoisePx = 0.05, kNoiseDoublesAtPx = 0.45;
+constexpr double kLeastNoisePx = 0.042, kNoiseDoublesAtPx = 0.45;
 constexpr double kMostMisread = 0.1;  ///< of a way's square that a change of unit leaves
 
 /// Median distance of the inverse depths to one.

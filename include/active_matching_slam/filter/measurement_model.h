@@ -14,7 +14,8 @@ namespace active_matching_slam {
 /// Where a feature is seen and how that answers to the error state.
 struct FeatureProjection {
   Eigen::Vector2d pixel;
-  Eigen::Matrix<double, 2, CameraError::kSize> d_camera;
+  Eigen::Matrix<double, 2, CameraError::kSize> d_camera =
+      Eigen::Matrix<double, 2, CameraError::kSize>::Zero();
   Eigen::Matrix<double, 2, 6> d_feature;  ///< by the feature's error, its first size() columns
   Eigen::Matrix<double, 2, 3> d_ray;      ///< by the world vector that is projected
 };
