@@ -178,11 +178,17 @@ TEST(Renderer, FinePatternsTurnGreyInsteadOfAliasing) {
   EXPECT_LT(deviation[0], 0.03);
 }
 
-TEST(Renderer, BlurIsCentredOnTheMiddleOfTheExposure) {
-  Scene scene;
+/// 8 m wide, 2 m ahead: dark to the left of the axis and bright to the right.
+Scene verticalEdge(double height) {
   cv::Mat edge(64, 1024, CV_32FC1, cv::Scalar(0.1));
   edge.colRange(512, 1024).setTo(cv::Scalar(0.9));
-  scene.surfaces.push_back(facing(2.0, 8.0, 4.0, edge));
+  Scene scene;
+  scene.surfaces.push_back(facing(2.0, 8.0, height, edge));
+  return scene;
+}
+
+TEST(Renderer, BlurIsCentredOnTheMiddleOfTheExposure) {
+  const Scene scene = verticalEdge(4.0);
   const CameraModel model = camera("none", 320, 96);
   const Renderer renderer(model, scene);
   const auto pose_at = [](double moment) {
@@ -219,10 +225,7 @@ std::pair<double, double> smear(const cv::Mat& light) {
 }
 
 TEST(Renderer, BlurIsTheSameToBothSidesHoweverFewItsSamples) {
-  Scene scene;
-  cv::Mat edge(64, 1024, CV_32FC1, cv::Scalar(0.1));
-  edge.colRange(512, 1024).setTo(cv::Scalar(0.9));
-  scene.surfaces.push_back(facing(2.0, 8.0, 4.0, edge));
+  const Scene scene = verticalEdge(4.0);
   const CameraModel model = camera("none", 320, 96);
   const Renderer renderer(model, scene);
   constexpr int kShifts = 8;  // of the edge over a pixel: what pixels make of it averages out
@@ -248,10 +251,7 @@ TEST(Renderer, BlurIsTheSameToBothSidesHoweverFewItsSamples) {
 }
 
 TEST(Renderer, RollingShutterGivesEveryRowItsPose) {
-  Scene scene;
-  cv::Mat edge(64, 1024, CV_32FC1, cv::Scalar(0.1));
-  edge.colRange(512, 1024).setTo(cv::Scalar(0.9));
-  scene.surfaces.push_back(facing(2.0, 8.0, 6.0, edge));
+  const Scene scene = verticalEdge(6.0);
   const CameraModel model = camera("none", 320, 96);
   const Renderer renderer(model, scene, true);
   const auto pose_at = [](double row) {
