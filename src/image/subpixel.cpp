@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "cubic_sampling.h"
+#include "sampling.h"
 
 namespace active_matching_slam {
 namespace {

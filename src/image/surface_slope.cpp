@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "cubic_sampling.h"
+#include "sampling.h"
 
 namespace active_matching_slam {
 namespace {

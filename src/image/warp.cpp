@@ -5,26 +5,27 @@
 #include <cmath>
 
 #include "active_matching_slam/filter/ekf.h"
-#include "cubic_sampling.h"
+#include "sampling.h"
 
 namespace active_matching_slam {
 namespace {
 
-/// Cubic interpolation for positions from (-0.5, -0.5) on; beyond the rim the outermost pixels
-/// repeat.
+/// Interpolates at positions from (-0.5, -0.5) on; beyond the rim the outermost pixels repeat.
 float sample(const cv::Mat& image, double u, double v) {
   // Truncation is the floor of what is positive, and far cheaper.
   const int at_u = static_cast<int>(u + 1.0) - 1, at_v = static_cast<int>(v + 1.0) - 1;
-  float weights_u[4], weights_v[4];
-  cubicWeights(u - at_u, weights_u);
-  cubicWeights(v - at_v, weights_v);
-  int columns[4];
-  for (int i = 0; i < 4; ++i) columns[i] = std::clamp(at_u - 1 + i, 0, image.cols - 1);
+  float weights_u[kTaps], weights_v[kTaps];
+  interpolationWeights(u - at_u, weights_u);
+  interpolationWeights(v - at_v, weights_v);
+  int columns[kTaps];
+  for (int i = 0; i < kTaps; ++i)
+    columns[i] = std::clamp(at_u - kTapsBefore + i, 0, image.cols - 1);
   float value = 0.0f;
-  for (int j = 0; j < 4; ++j) {
-    const std::uint8_t* row = image.ptr<std::uint8_t>(std::clamp(at_v - 1 + j, 0, image.rows - 1));
+  for (int j = 0; j < kTaps; ++j) {
+    const int at_row = std::clamp(at_v - kTapsBefore + j, 0, image.rows - 1);
+    const std::uint8_t* row = image.ptr<std::uint8_t>(at_row);
     float along = 0.0f;
-    for (int i = 0; i < 4; ++i) along += weights_u[i] * row[columns[i]];
+    for (int i = 0; i < kTaps; ++i) along += weights_u[i] * row[columns[i]];
     value += weights_v[j] * along;
   }
   return value;

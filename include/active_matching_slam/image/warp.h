@@ -59,9 +59,9 @@ class SourceOffset {
   Eigen::Matrix<double, 2, 3> bend_;
 };
 
-/// Resamples the source patch as `view` expects it (cubic interpolation; averaged where the patch
-/// shrinks), with the feature at the centre of the template's middle pixel. False (and `result`
-/// empty) when the template would reach beyond the stored patch or the view is degenerate.
+/// Resamples the source patch as `view` expects it (interpolated; averaged where the patch shrinks),
+/// with the feature at the centre of the template's middle pixel. False (and `result` empty) when
+/// the template would reach beyond the stored patch or the view is degenerate.
 bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_size_px,
                   Template* result);
 
