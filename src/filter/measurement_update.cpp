@@ -1,5 +1,7 @@
 #include "measurement_update.h"
 
+#include <Eigen/LU>
+
 #include "active_matching_slam/filter/state_error.h"
 
 namespace active_matching_slam {
@@ -7,6 +9,8 @@ namespace {
 
 /// Linearisation is repeated when it missed by more than this, root mean square, in sigmas.
 constexpr double kNonlinearityTolerance = 0.2;
+/// A measurement's squared distance from what all others say of it, in sigmas; of 2 expected.
+constexpr double kStrayChi2 = 9.0;
 
 }  // namespace
 
@@ -28,6 +32,7 @@ MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState
   z_.resize(2 * measurements.size());
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     z_.segment<2>(2 * i) = measurements[i].pixel;
+    variances_px2_.push_back(measurements[i].variance_px2);
     const FeatureState& feature = features[measurements[i].feature];
     moments_.push_back(feature.kind == FeatureKind::kInverseDepth
                            ? relativeCovariance(feature, covariance)
@@ -54,9 +59,35 @@ bool MeasurementUpdate::linearise() {
 void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) const {
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     auto block = S.block<2, 2>(2 * i, 2 * i);
-    block.diagonal().array() += measurements_[i].variance_px2;
+    block.diagonal().array() += variances_px2_[i];
     if (moments_[i](3, 3) > 0.0) block += secondOrderNoise(stack_.projection(i), moments_[i]);
   }
+}
+
+bool MeasurementUpdate::factorise(const Eigen::MatrixXd& S) {
+  llt_.compute(S);
+  if (llt_.info() != Eigen::Success) return false;
+  inverse_root_ = Eigen::MatrixXd::Identity(S.rows(), S.cols());
+  llt_.matrixL().solveInPlace(inverse_root_);
+  return true;
+}
+
+/// `weighted`: S^-1 y for the innovation y. Of what the others leave of y_i, the covariance is the
+/// inverse of that block of S^-1, and itself that times the block of S^-1 y. Whether there are any.
+bool MeasurementUpdate::doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S) {
+  bool any = false;
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    const auto columns = inverse_root_.middleCols<2>(2 * i);
+    const Eigen::Matrix2d left_out = (columns.transpose() * columns).inverse();
+    const Eigen::Vector2d w = weighted.segment<2>(2 * i);
+    const double chi2 = w.dot(left_out * w);
+    if (!(chi2 > kStrayChi2)) continue;
+    const double more_px2 = 0.5 * left_out.trace() * (chi2 / kStrayChi2 - 1.0);
+    variances_px2_[i] += more_px2;
+    S.block<2, 2>(2 * i, 2 * i).diagonal().array() += more_px2;
+    any = true;
+  }
+  return any;
 }
 
 bool MeasurementUpdate::step(bool first) {
@@ -74,10 +105,15 @@ bool MeasurementUpdate::step(bool first) {
     innovation += stack_.times(delta_) + HC * (L_.transpose() * delta_);
   }
   addNoise(S);
-  llt_.compute(S);
-  if (llt_.info() != Eigen::Success) return false;
-  const Eigen::VectorXd weighted = llt_.solve(innovation);
-  if (first) nis_ = innovation.dot(weighted);
+  if (!factorise(S)) return false;
+  Eigen::VectorXd weighted = llt_.solve(innovation);
+  if (first) {
+    nis_ = innovation.dot(weighted);
+    if (doubtStrays(weighted, S)) {
+      if (!factorise(S)) return false;
+      weighted = llt_.solve(innovation);
+    }
+  }
   delta_.noalias() = X_ * weighted;
   delta_.segment<CameraError::kCalibrationSize>(CameraError::kReadout) *= calibration_share_;
   if (!delta_.allFinite()) return false;
@@ -91,8 +127,8 @@ bool MeasurementUpdate::step(bool first) {
 bool MeasurementUpdate::isLinearEnough(const Eigen::VectorXd& expected) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
-    sum += (stack_.projection(i).pixel - expected.segment<2>(2 * i)).squaredNorm() /
-           measurements_[i].variance_px2;
+    sum +=
+        (stack_.projection(i).pixel - expected.segment<2>(2 * i)).squaredNorm() / variances_px2_[i];
   }
   return sum < kNonlinearityTolerance * kNonlinearityTolerance * expected.size();
 }
@@ -111,13 +147,9 @@ bool MeasurementUpdate::solve(int iterations) {
 
 std::vector<double> MeasurementUpdate::noiseLeft() const {
   // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
-  Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(llt_.rows(), llt_.rows());
-  llt_.matrixL().solveInPlace(inverse_root);
   std::vector<double> left;
-  for (std::size_t i = 0; i < measurements_.size(); ++i) {
-    left.push_back(0.5 * measurements_[i].variance_px2 *
-                   inverse_root.middleCols<2>(2 * i).squaredNorm());
-  }
+  for (std::size_t i = 0; i < measurements_.size(); ++i)
+    left.push_back(0.5 * variances_px2_[i] * inverse_root_.middleCols<2>(2 * i).squaredNorm());
   return left;
 }
 

@@ -16,10 +16,11 @@ struct UsableMeasurement {
 };
 
 /// The gain of one update, by repeated linearisation (Bell & Cathey 1993), with the noise of what
-/// linearisation leaves out. All errors count from the prior mean; the Jacobian of an iteration is
-/// that of the mean reached. The second-order noise stays the prior's: shrunk along with the
-/// posterior it trusted the wrong one of two explanations of a small first move, depths reversed,
-/// for good.
+/// linearisation leaves out. A measurement that disagrees with all others is taken to have the
+/// noise with which it would not: matches are more often far off than a Gaussian's. All errors
+/// count from the prior mean; the Jacobian of an iteration is that of the mean reached. The
+/// second-order noise stays the prior's: shrunk along with the posterior it trusted the wrong one
+/// of two explanations of a small first move, depths reversed, for good.
 class MeasurementUpdate {
  public:
   /// `X`: workspace, state size x 2 measurements. `calibration_share`: how much of its correction
@@ -48,6 +49,8 @@ class MeasurementUpdate {
   bool linearise();
   bool step(bool first);
   void addNoise(Eigen::MatrixXd& S) const;
+  bool factorise(const Eigen::MatrixXd& S);
+  bool doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S);
   bool isLinearEnough(const Eigen::VectorXd& expected_pixels) const;
 
   const CameraModel& model_;
@@ -63,7 +66,9 @@ class MeasurementUpdate {
   MeasurementStack stack_;
   Eigen::VectorXd z_, delta_;
   Eigen::MatrixXd prior_gauge_, C_, L_, PL_;
+  std::vector<double> variances_px2_;  ///< of the measurements, as far as they agree
   Eigen::LLT<Eigen::MatrixXd> llt_;
+  Eigen::MatrixXd inverse_root_;          ///< U^-1
   std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points
   double nis_ = 0.0;
 };

@@ -101,7 +101,7 @@ TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
     Ekf filter =
         exampleFilter(model_, seed, 6, seed == 1u ? CameraState() : poorlyCalibratedCamera());
     Random random(seed + 100);
-    auto measurements = noisyMeasurements(filter, model_, 3.0, random);
+    auto measurements = noisyMeasurements(filter, model_, 1.0, random);
     measurements.resize(measurements.size() / 2);
     FilterOptions once = filter.options();
     once.update_iterations = 1;
@@ -145,6 +145,38 @@ TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
     EXPECT_LT(errorBetween(camera, features, filter.camera(), filter.features(), n).norm(), 1e-10);
     EXPECT_NEAR(report.nis, innovation.dot(S.inverse() * innovation), 1e-8 * report.nis);
   }
+}
+
+TEST_F(EkfUpdate, AMatchThatDisagreesWithAllOthersHasTheNoiseWithWhichItWouldNot) {
+  constexpr double kMostChi2 = 9.0;
+  FilterOptions once = exampleOptions();
+  once.update_iterations = 1;
+  const Ekf before = exampleFilter(model_, 1, 6, CameraState(), once);
+  const PredictedMeasurements predicted = before.predictMeasurements(model_, idsOf(before));
+  const auto offBy = [&](double px, double sigma_px) {
+    std::vector<FeatureMeasurement> measurements;
+    for (std::size_t i = 0; i < predicted.ids.size(); ++i)
+      measurements.push_back({predicted.ids[i], predicted.z.segment<2>(2 * i), 0.0});
+    measurements[2].pixel.x() += px;
+    measurements[2].sigma_px = sigma_px;
+    Ekf filter = before;
+    EXPECT_TRUE(filter.update(model_, measurements).healthy);
+    return filter;
+  };
+  // By all others, with the noise of this one, it is expected to be so far off.
+  const Eigen::Matrix2d left_out = predicted.S.inverse().eval().block<2, 2>(4, 4).inverse();
+  const Eigen::Vector2d off(12.0, 0.0);
+  const double chi2 = off.dot(left_out.inverse() * off);
+  ASSERT_GT(chi2, kMostChi2);
+  const double more_px2 = 0.5 * left_out.trace() * (chi2 / kMostChi2 - 1.0);
+  const Ekf doubted = offBy(off.x(), 0.0);
+  const Ekf expected = offBy(off.x(), std::sqrt(once.sigma_px * once.sigma_px + more_px2));
+  const auto motion = [](const Ekf& filter) { return filter.camera().position_world; };
+  EXPECT_LT((motion(doubted) - motion(expected)).norm(), 0.02 * motion(expected).norm());
+  EXPECT_LT(relativeDifference(doubted.covariance(), expected.covariance()), 0.02);
+  // So the farther off it is, the less it moves the rest.
+  EXPECT_LT((motion(offBy(40.0, 0.0)) - motion(before)).norm(),
+            0.7 * (motion(doubted) - motion(before)).norm());
 }
 
 /// Minus twice the logarithm of the posterior density.
