@@ -16,12 +16,13 @@ constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once t
 /// What a patch is off in its own way, in what images tell of it, and the motion of the image after
 /// which it is another: it is weighed as white noise of so many times the variance as images show
 /// the same. (By NEES over rendered runs.)
-constexpr double kUnseen = 0.7;
-constexpr double kFreshPx = 2.0;
+constexpr double kUnseen = 0.56;
+constexpr double kFreshPx = 6.0;
 constexpr double kMostRepetitions = 50.0;
 /// Power of what images tell by which corners wander more. (By the same.)
 constexpr double kWanderByMisfit = 2.0;
-constexpr double kSigmaByMedian = 1.4826;  ///< of a Gaussian's absolute values
+constexpr double kSharpest = 0.2, kMostBlurred = 5.0;  ///< image, in what most tell
+constexpr double kSigmaByMedian = 1.4826;              ///< of a Gaussian's absolute values
 
 constexpr double kSightWeight = 0.1;  ///< of one match in a feature's average, once there are many
 constexpr double kMemory = 0.99;      ///< of a feature's noise, a match
@@ -40,7 +41,7 @@ double MatchNoise::learn(const std::vector<Eigen::Vector2d>& residuals_px) {
   if (sizes_px.size() < 2 * kLeastMatches) return 0.0;
   const double shown_px = kSigmaByMedian * medianOf(std::move(sizes_px));
   const double weight = std::max(kLeastWeight, 1.0 / ++updates_);
-  shown_px2_ += weight * (shown_px * shown_px - shown_px2_);
+  shown_px2_ += weight * (std::pow(shown_px / of_image_, 2) - shown_px2_);
   return shown_px;
 }
 
@@ -53,9 +54,11 @@ void MatchNoise::seeMotion(std::vector<double> motions_px) {
 }
 
 void MatchNoise::see(std::vector<double> sigmas_px) {
+  of_image_ = 1.0;
   if (sigmas_px.size() < kLeastMatches) return;
   const double now_px = medianOf(std::move(sigmas_px));
   seen_px_ += (seen_px_ > 0.0 ? kLeastWeight : 1.0) * (now_px - seen_px_);
+  if (seen_px_ > 0.0) of_image_ = std::clamp(now_px / seen_px_, kSharpest, kMostBlurred);
 }
 
 double MatchNoise::likeMost(const FeatureNoise& feature) const {
@@ -66,7 +69,7 @@ double MatchNoise::likeMost(const FeatureNoise& feature) const {
 double MatchNoise::sigma_px(const FilterOptions& options) const {
   if (updates_ == 0) return options.sigma_px;
   const double sigma_px =
-      std::sqrt(shown_px2_ + repetitions_ * kUnseen * kUnseen * seen_px_ * seen_px_);
+      of_image_ * std::sqrt(shown_px2_ + repetitions_ * kUnseen * kUnseen * seen_px_ * seen_px_);
   return std::min(options.sigma_px, std::max(options.minimum_sigma_px, sigma_px));
 }
 

@@ -280,15 +280,16 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
   std::vector<double> seen_px;
   for (int k : agreeingMeasurements(innovation, S, kAgreementChi2)) {
     const FeatureId id = prior_.ids[matched[k]];
-    fused.push_back({id, prior_.mean(matched[k]) + innovation.segment<2>(2 * k), 0.0});
-    map_.seeNoise(id, sigmas_px[k]);
+    fused.push_back({id, prior_.mean(matched[k]) + innovation.segment<2>(2 * k), sigmas_px[k]});
     if (sigmas_px[k] > 0.0) seen_px.push_back(sigmas_px[k]);
   }
   match_noise_.see(std::move(seen_px));
   match_noise_.seeMotion(matchMotions(fused_, fused));
   frame->match_sigma_px = match_noise_.sigma_px(options_.filter);
-  for (FeatureMeasurement& match : fused)
+  for (FeatureMeasurement& match : fused) {
+    map_.seeNoise(match.id, match.sigma_px / match_noise_.ofImage());
     match.sigma_px = match_noise_.sigma_px(options_.filter, map_.find(match.id)->noise);
+  }
   fused_ = std::move(fused);
 
   const UpdateReport report = filter_.update(camera_, fused_);

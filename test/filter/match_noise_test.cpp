@@ -56,6 +56,30 @@ TEST(MatchNoise, HasWhatImagesTellAddedSinceUpdatesDoNotShowIt) {
   EXPECT_LT(noise.sigma_px(options), std::hypot(shown, 0.12));
 }
 
+TEST(MatchNoise, FollowsTheBlurOfAnImageAtOnceAndForgetsItWithTheNext) {
+  const FilterOptions options;
+  MatchNoise noise;
+  std::mt19937 generator(1);
+  const auto image = [&](double seen_px, double shown_px) {
+    noise.see(std::vector<double>(20, seen_px));
+    const double before_update = noise.sigma_px(options);
+    noise.learn(gaussian(shown_px, 50, &generator));
+    return before_update;
+  };
+  for (int k = 0; k < 200; ++k) image(0.03, 0.04);
+  const double sharp = image(0.03, 0.04);
+  EXPECT_EQ(noise.ofImage(), 1.0);
+  const double blurred = image(0.09, 0.12);
+  EXPECT_GT(blurred, 2.5 * sharp);
+  EXPECT_LT(blurred, 3.0 * sharp);
+  image(0.09, 0.12);
+  EXPECT_NEAR(image(0.03, 0.04), sharp, 0.15 * sharp);
+  noise.see({0.09, 0.09});  // too few: like most
+  EXPECT_EQ(noise.ofImage(), 1.0);
+  image(1.0, 0.04);  // however little such an image has of the templates
+  EXPECT_LE(noise.ofImage(), 5.0);
+}
+
 TEST(MatchNoise, OfAFeatureGrowsWithWhatIsLeftBetweenItsImagesAndItsTemplate) {
   const FilterOptions options;
   MatchNoise noise;

@@ -13,7 +13,8 @@ namespace active_matching_slam {
 /// matches; like others, until there are enough to tell.
 class FeatureNoise {
  public:
-  /// `sigma_px` of a match as its image tells it (SearchMatch::sigma_px); 0 tells nothing.
+  /// `sigma_px` of a match as its image tells it (SearchMatch::sigma_px), over
+  /// MatchNoise::ofImage(); 0 tells nothing.
   void see(double sigma_px);
 
   /// `residual_px` as MatchNoise::learn() has it, `shown_px` > 0 what it returned for that frame.
@@ -34,7 +35,9 @@ class FeatureNoise {
 
 /// The noise of matches as updates show it: what they leave between matches and map, by its median
 /// (so that the few that are wrong don't count), averaged over half a second or so, and what each
-/// patch is off in its own way, which the map follows, so that nothing is left of it. It is for the
+/// patch is off in its own way, which the map follows, so that nothing is left of it. Both as much
+/// more or less as the present image is blurred or sharp: what is left between it and the templates
+/// tells so at once. It is for the
 /// update only; gates and mutual information keep FilterOptions::sigma_px, which must hold for what
 /// has not been matched yet.
 class MatchNoise {
@@ -43,7 +46,8 @@ class MatchNoise {
   void reset() { *this = MatchNoise(); }
 
   /// `residuals_px`: each match fused, less the feature's projection after the update, over the
-  /// root of UpdateReport::noise_left and over likeMost() of its feature. Too few tell nothing.
+  /// root of UpdateReport::noise_left and over likeMost() of its feature; of the image that see()
+  /// was told of. Too few tell nothing.
   /// Returns what they show, as a standard deviation per axis [px]; 0: nothing.
   double learn(const std::vector<Eigen::Vector2d>& residuals_px);
 
@@ -52,8 +56,12 @@ class MatchNoise {
   /// nothing.
   void seeMotion(std::vector<double> motions_px);
 
-  /// What an image tells of its matches (SearchMatch::sigma_px, known ones). Too few tell nothing.
+  /// What the present image tells of its matches (SearchMatch::sigma_px, known ones). Too few tell
+  /// nothing: it is like most.
   void see(std::vector<double> sigmas_px);
+
+  /// Standard deviation of matches in the present image in that of most images.
+  double ofImage() const { return of_image_; }
 
   /// Standard deviation of a feature's matches in that of most, by what images told. What is left
   /// between image and template says how much a patch is off by chance; where it is more than of
@@ -67,8 +75,9 @@ class MatchNoise {
   double sigma_px(const FilterOptions& options, const FeatureNoise& feature) const;
 
  private:
-  double shown_px2_ = 0.0;    ///< average variance
-  double seen_px_ = 0.0;      ///< average of what images tell of most matches; 0: nothing yet
+  double shown_px2_ = 0.0;  ///< average variance, in an image like most
+  double seen_px_ = 0.0;    ///< average of what images tell of most matches; 0: nothing yet
+  double of_image_ = 1.0;
   int updates_ = 0;           ///< that told something
   double repetitions_ = 1.0;  ///< images with the same unseen error
 };
