@@ -14,7 +14,7 @@ namespace active_matching_slam {
 /// ascending. Empty where the bundle leaves them open. Moves are left to the caller.
 std::optional<AdjustedStart> makeAdjustedStart(const CameraModel& model, const Ekf& filter,
                                                const BundleOptions& options, const Bundle& bundle,
-                                               const std::vector<FeatureId>& ids, BundleUnit unit,
+                                               const std::vector<FeatureId>& ids,
                                                double interval_s);
 
 /// Whether `filter` knows the distances of the features of `start` clearly better than that does.

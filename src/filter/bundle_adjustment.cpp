@@ -240,14 +240,6 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
   }
 }
 
-/// Derivative, by the cameras' errors, of the factor by which their way fits itself best.
-Eigen::VectorXd wayFunctional(const Bundle& bundle, int size) {
-  Eigen::VectorXd way = Eigen::VectorXd::Zero(size);
-  for (std::size_t k = 1; k < bundle.cameras.size(); ++k)
-    way.segment<3>(6 * static_cast<Eigen::Index>(k - 1)) = bundle.cameras[k].position_world;
-  return way / way.squaredNorm();
-}
-
 }  // namespace
 
 void rescaleBundle(double factor, Bundle* bundle) {
@@ -295,7 +287,7 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
 }
 
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
-                                 const Bundle& bundle, int first_camera, BundleUnit unit,
+                                 const Bundle& bundle, int first_camera,
                                  double relative_scale_sigma) {
   const NormalEquations N = linearise(model, options, bundle);
   const LensVector lens_information = calibrationInformation(options).tail<kLensSize>();
@@ -319,19 +311,12 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
     covariance.block<3, 3>(kept + 3 * i, kept + 3 * i) +=
         reduced->inverse_roots[i].transpose() * reduced->inverse_roots[i];
   // The unit is known as well as said: one more measurement.
-  Eigen::VectorXd along;
-  double variance = 0.0;
-  if (unit == BundleUnit::kWay) {
-    const Eigen::VectorXd way = reduced->factor.matrixL().solve(wayFunctional(bundle, cameras));
-    along = M.transpose() * way;
-    variance = way.squaredNorm();
-  } else {
-    Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.cols());
-    for (int i = 0; i < F; ++i)
-      depths[kept + 3 * i + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
-    along = lower * depths;
-    variance = depths.dot(along);
-  }
+  double sum = 0.0;
+  for (const FeatureState& feature : bundle.features) sum += feature.inverse_depth;
+  Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.cols());
+  for (int i = 0; i < F; ++i) depths[kept + 3 * i + 2] = 1.0 / sum;
+  const Eigen::VectorXd along = lower * depths;
+  const double variance = depths.dot(along);
   lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + variance));
   covariance.triangularView<Eigen::StrictlyUpper>() = covariance.transpose();
   return covariance;

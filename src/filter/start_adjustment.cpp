@@ -14,9 +14,10 @@
 namespace active_matching_slam {
 namespace {
 
-/// Parallax: adjusted first at [sigma of the noise of image points], and no more beyond.
-constexpr double kFirstParallaxSigmas = 0.75, kLastParallaxPx = 20.0;
-constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next
+/// Parallax: adjusted first at [sigma of the noise of image points], with every image until it is
+/// so much [px], and no more beyond.
+constexpr double kFirstParallaxSigmas = 0.75, kEveryImageUpToPx = 3.0, kLastParallaxPx = 20.0;
+constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next, then
 /// Share of the points: where most are as far as each other, the few that are near tell the motion.
 constexpr double kAllButNear = 0.75;
 constexpr std::size_t kMostImages = 40;     ///< kept
@@ -25,6 +26,7 @@ constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and c
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
+constexpr double kSharpestImage = 0.5, kMostBlurredImage = 5.0;  ///< likewise
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
 constexpr double kSettlingLead = 20.0, kSettlingParallaxPx = 2.0;
@@ -38,6 +40,14 @@ const FeatureMeasurement* find(const std::vector<FeatureMeasurement>& measuremen
 
 std::vector<Eigen::Vector2d> zeros(std::size_t count) {
   return std::vector<Eigen::Vector2d>(count, Eigen::Vector2d::Zero());
+}
+
+/// Of the measurements whose noise is known; 0 without any.
+double medianSigma(const std::vector<FeatureMeasurement>& measurements) {
+  std::vector<double> known_px;
+  for (const FeatureMeasurement& m : measurements)
+    if (m.sigma_px > 0.0) known_px.push_back(m.sigma_px);
+  return medianOf(std::move(known_px));
 }
 
 /// The same feature, anchored at the origin.
@@ -106,10 +116,10 @@ std::optional<double> parallaxBetween(const CameraModel& model,
 
 void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasurement>& first) {
   is_active_ = true;
-  images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
+  images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size()), medianSigma(first)});
   features_.clear();
-  has_left_first_ = is_unit_known_ = is_settled_ = false;
-  unit_drift_ = least_motion_px_ = 1.0;
+  has_left_first_ = is_settled_ = false;
+  least_motion_px_ = 1.0;
   last_parallax_px_ = next_parallax_px_ = 0.0;
   age_ = last_age_ = 0;
   chosen_.reset();
@@ -127,7 +137,12 @@ void StartAdjustment::add(std::int64_t index, double interval_s, const Ekf& filt
   if (!is_active_) return;
   ++age_;
   rememberFeatures(filter);
-  Image image{index, interval_s, filter.camera(), measurements, zeros(measurements.size())};
+  Image image{index,
+              interval_s,
+              filter.camera(),
+              measurements,
+              zeros(measurements.size()),
+              medianSigma(measurements)};
   Image& before = images_.back();
   for (std::size_t i = 0; interval_s > 0.0 && i < measurements.size(); ++i) {
     const FeatureMeasurement* same = find(before.measurements, measurements[i].id);
@@ -141,7 +156,6 @@ void StartAdjustment::add(std::int64_t index, double interval_s, const Ekf& filt
 }
 
 void StartAdjustment::rescale(double factor) {
-  is_unit_known_ = true;
   for (Image& image : images_) image.camera.position_world *= factor;
   for (FeatureState& feature : features_) feature.rescale(factor);
 }
@@ -190,32 +204,41 @@ std::optional<double> StartAdjustment::parallax(const CameraModel& model) {
   return most_px;
 }
 
-/// Whether parallax is more than noise, and it or time have grown enough since last asked with so
-/// much.
+/// Whether parallax is more than noise, and so little that each image tells more, or it or time
+/// have grown enough since last asked with so much.
 bool StartAdjustment::isTime(double parallax_px, double sigma_px) {
   const bool has_aged = last_age_ > 0 && age_ > kGrowth * last_age_;
   if (parallax_px < kFirstParallaxSigmas * sigma_px) return false;
-  if (parallax_px < next_parallax_px_ && !has_aged) return false;
+  if (parallax_px > kEveryImageUpToPx && parallax_px < next_parallax_px_ && !has_aged) return false;
   next_parallax_px_ = std::max(next_parallax_px_, kGrowth * parallax_px);
   last_age_ = age_;
   return true;
 }
 
-/// Standard deviation of each feature's matches as the last image with it had it, in that of most.
+/// Standard deviation of each feature's matches, in that of most of its image, as the last image
+/// with it had it.
 std::vector<double> StartAdjustment::noiseOfFeatures(const std::vector<FeatureId>& ids) const {
-  std::vector<double> noise_px(ids.size(), 0.0), known_px;
+  std::vector<double> noise(ids.size(), 1.0);
   for (const Image& image : images_)
     for (const FeatureMeasurement& m : image.measurements) {
       const auto it = std::lower_bound(ids.begin(), ids.end(), m.id);
       if (it != ids.end() && *it == m.id && m.sigma_px > 0.0)
-        noise_px[it - ids.begin()] = m.sigma_px;
+        noise[it - ids.begin()] = std::max(kCleanestNoise, m.sigma_px / image.sigma_px);
     }
-  for (const double sigma_px : noise_px)
-    if (sigma_px > 0.0) known_px.push_back(sigma_px);
+  return noise;
+}
+
+/// Standard deviation of most matches of each image, in that of most images.
+std::vector<double> StartAdjustment::noiseOfImages() const {
+  std::vector<double> known_px, noise;
+  for (const Image& image : images_)
+    if (image.sigma_px > 0.0) known_px.push_back(image.sigma_px);
   const double most_px = medianOf(std::move(known_px));
-  for (double& noise : noise_px)
-    noise = noise > 0.0 ? std::max(kCleanestNoise, noise / most_px) : 1.0;
-  return noise_px;
+  for (const Image& image : images_)
+    noise.push_back(image.sigma_px > 0.0
+                        ? std::clamp(image.sigma_px / most_px, kSharpestImage, kMostBlurredImage)
+                        : 1.0);
+  return noise;
 }
 
 Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const {
@@ -228,8 +251,9 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
     ids->push_back(feature.id);
     bundle.features.push_back(seenFromOrigin(feature));
   }
-  const std::vector<double> noise = noiseOfFeatures(*ids);
-  for (const Image& image : images_) {
+  const std::vector<double> of_features = noiseOfFeatures(*ids), of_images = noiseOfImages();
+  for (std::size_t k = 0; k < images_.size(); ++k) {
+    const Image& image = images_[k];
     bundle.cameras.push_back(image.camera);
     bundle.observations.emplace_back();
     for (std::size_t i = 0; i < image.measurements.size(); ++i) {
@@ -237,7 +261,7 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
       const auto it = std::lower_bound(ids->begin(), ids->end(), m.id);
       if (it == ids->end() || *it != m.id) continue;
       BundleObservation o{static_cast<int>(it - ids->begin()), m.pixel};
-      o.noise = noise[o.feature];
+      o.noise = of_features[o.feature] * of_images[k];
       o.d_calibration << rowShare(model, m.pixel.y()) * image.speeds[i],
           model.pixelByCorrection(m.pixel);
       bundle.observations.back().push_back(o);
@@ -254,7 +278,8 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
     if (!parallax_px || !isTime(*parallax_px, filter.options().sigma_px)) return std::nullopt;
     chosen_ = chooseReading(model, filter, *parallax_px);
     if (!chosen_ && *parallax_px >= kLastParallaxPx) end();
-    return std::nullopt;  // the rest waits for the next image, so that no frame takes long
+    // Later, with more images, the rest waits for the next one, so that no frame takes long.
+    if (!chosen_ || *parallax_px > kEveryImageUpToPx) return std::nullopt;
   }
   const Reading chosen = *std::exchange(chosen_, std::nullopt);
   if (chosen.parallax_px >= kLastParallaxPx) end();
@@ -326,21 +351,10 @@ std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model,
     adjustBundle(model, options, &reading);
     noise_px = noiseOf(model, reading);
   }
-  adjustByItsNoise(model, chosen.parallax_px, noise_px, &options, &reading, &believed, &ids);
-
-  // Others have seen the way, so that its unit stays, as far as it was known.
-  const double by_depths = depthFactor(believed, reading), by_way = wayFactor(believed, reading);
-  const bool keeps_way = (last_parallax_px_ > 0.0 || is_unit_known_) && by_way > 0.0;
-  double drift = unit_drift_;
-  if (keeps_way) {
-    drift *= by_way / by_depths;
-    if (!is_unit_known_)
-      drift = std::pow(drift, 1.0 / (1.0 + std::pow(options.sigma_px / last_parallax_px_, 2)));
-  }
-  rescaleBundle(by_depths * drift / unit_drift_, &reading);
-  auto start = makeAdjustedStart(model, filter, options, reading, ids,
-                                 keeps_way ? BundleUnit::kWay : BundleUnit::kDepths,
-                                 images_.back().interval_s);
+  adjustByItsNoise(model, noise_px, &options, &reading, &believed, &ids);
+  // Others have seen the map: its unit of length stays.
+  rescaleBundle(depthFactor(believed, reading), &reading);
+  auto start = makeAdjustedStart(model, filter, options, reading, ids, images_.back().interval_s);
   if (!start) return std::nullopt;
   if (chosen.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();
@@ -349,7 +363,6 @@ std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model,
   start->is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
   adopt(reading, ids, &*start);
   is_settled_ |= chosen.lead > kSettlingLead && chosen.parallax_px > kSettlingParallaxPx;
-  unit_drift_ = drift;
   last_parallax_px_ = chosen.parallax_px;
   return start;
 }

@@ -1,7 +1,6 @@
 #include "start_bundle.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -12,12 +11,10 @@ namespace {
 
 /// Prior of depths in the end, by how far apart they turned out to be (median).
 constexpr double kDepthSpread = 3.5;
-constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.25;
-/// What an adjustment takes for the noise of image points at least, with much parallax. While there
-/// is hardly any, the covariance, which is linear, says too little: with a parallax of this, twice.
-/// (By NEES over rendered runs.)
-constexpr double kLeastNoisePx = 0.042, kNoiseDoublesAtPx = 0.45;
-constexpr double kMostMisread = 0.1;  ///< of a way's square that a change of unit leaves
+constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.12;
+/// What an adjustment takes for the noise of image points, by what they show (by NEES over rendered
+/// runs), and at least.
+constexpr double kShareOfNoise = 0.9, kLeastNoisePx = 0.005;
 
 /// Median distance of the inverse depths to one.
 double medianDeviation(const Bundle& bundle, double inverse_depth) {
@@ -73,38 +70,27 @@ BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options) {
   return options;
 }
 
-void adjustByItsNoise(const CameraModel& model, double parallax_px, double noise_px,
-                      BundleOptions* options, Bundle* reading, Bundle* believed,
-                      std::vector<FeatureId>* ids) {
+void adjustByItsNoise(const CameraModel& model, double noise_px, BundleOptions* options,
+                      Bundle* reading, Bundle* believed, std::vector<FeatureId>* ids) {
   // Corners where something near hides something far wander by less than would make them outliers;
   // most image points are much better than that.
   options->outlier_px =
       std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
-  const double least_px = kLeastNoisePx * (1.0 + std::pow(kNoiseDoublesAtPx / parallax_px, 3));
-  options->sigma_px = std::min(options->sigma_px, std::max(noise_px, least_px));
+  // Neighbouring images are off in the same way: noise is higher than it shows while they are few.
+  const double images = static_cast<double>(reading->cameras.size());
+  const double shown_px = kShareOfNoise * noise_px * (1.0 + 1.0 / (images - 2.0));
+  options->sigma_px = std::min(options->sigma_px, std::max(shown_px, kLeastNoisePx));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);
 }
 
-double wayFactor(const Bundle& before, const Bundle& bundle) {
-  double product = 0.0, square = 0.0, square_before = 0.0;
-  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
-    const Eigen::Vector3d& was = before.cameras[k].position_world;
-    const Eigen::Vector3d& is = bundle.cameras[k].position_world;
-    product += is.dot(was);
-    square += is.squaredNorm();
-    square_before += was.squaredNorm();
-  }
-  if (!(product * product > (1.0 - kMostMisread) * square * square_before)) return 0.0;
-  return std::max(0.0, product / square);
-}
-
 double depthFactor(const Bundle& before, const Bundle& bundle) {
-  std::vector<double> logarithms;
-  for (std::size_t i = 0; i < bundle.features.size(); ++i)
-    logarithms.push_back(
-        std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth));
-  return std::exp(medianOf(std::move(logarithms)));
+  double sum = 0.0, sum_before = 0.0;
+  for (std::size_t i = 0; i < bundle.features.size(); ++i) {
+    sum += bundle.features[i].inverse_depth;
+    sum_before += before.features[i].inverse_depth;
+  }
+  return sum / sum_before;
 }
 
 }  // namespace active_matching_slam

@@ -13,17 +13,13 @@ BundleOptions startOptions(const FilterOptions& filter);
 /// The options for what is of such depths as `reading`.
 BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options);
 
-/// Adjusts all of `reading` by the noise that it shows, and leaves features that wander out of it,
-/// of `believed` and of `ids`. `options` keeps the lower noise.
-void adjustByItsNoise(const CameraModel& model, double parallax_px, double noise_px,
-                      BundleOptions* options, Bundle* reading, Bundle* believed,
-                      std::vector<FeatureId>* ids);
+/// Adjusts all of `reading` by the noise that it shows, `noise_px`, and leaves features that wander
+/// out of it, of `believed` and of `ids`. `options` keeps the lower noise.
+void adjustByItsNoise(const CameraModel& model, double noise_px, BundleOptions* options,
+                      Bundle* reading, Bundle* believed, std::vector<FeatureId>* ids);
 
-/// The factor by which the way of the cameras comes nearest to what it was. Zero when it was
-/// misread.
-double wayFactor(const Bundle& before, const Bundle& bundle);
-
-/// The factor by which the median of the inverse depths stays.
+/// The factor for lengths by which the mean of the inverse depths is what it was. Both bundles have
+/// the same features.
 double depthFactor(const Bundle& before, const Bundle& bundle);
 
 }  // namespace active_matching_slam

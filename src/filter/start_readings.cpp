@@ -23,6 +23,7 @@ constexpr double kMostCostPerPoint = 4.0;  ///< of 2 expected: beyond, things mo
 constexpr double kLeastNoise_px = 0.04;    ///< by which matches are told from wrong ones
 /// Of the assumed variance: when readings are compared, images are credited with no less.
 constexpr double kLeastNoiseShare = 0.05;
+constexpr double kMostNoise = 3.0;      ///< of a feature, in the median, that counts
 constexpr double kSameDirection = 0.8;  ///< cosine between two readings' moves that are one
 
 bool isSameReading(const Bundle& a, const Bundle& b) {
@@ -97,7 +98,11 @@ double noiseOf(const CameraModel& model, const Bundle& bundle) {
   const double unknowns = 3.0 * static_cast<double>(errors_px.size()) +
                           6.0 * static_cast<double>(bundle.cameras.size() - 1);
   const double freedom = std::max(equations - unknowns, 0.1 * equations);
-  return medianOf(std::move(errors_px)) * std::sqrt(equations / freedom);
+  const double most_px = kMostNoise * medianOf(errors_px);
+  double squares = 0.0;
+  for (const double error_px : errors_px) squares += std::pow(std::min(error_px, most_px), 2);
+  const double features = std::max(static_cast<double>(errors_px.size()), 1.0);
+  return std::sqrt(squares / features * equations / freedom);
 }
 
 std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleOptions& options,

@@ -144,15 +144,10 @@ TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
     const int row = first_feature + 3 * i + 2;
     information(row, row) += 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
   }
-  // The unit of the depths, or the factor by which the cameras' way fits itself best.
-  Eigen::VectorXd depths = Eigen::VectorXd::Zero(size), way = depths;
-  for (int i = 0; i < features; ++i)
-    depths[first_feature + 3 * i + 2] = 1.0 / (features * bundle.features[i].inverse_depth);
-  double square = 0.0;
-  for (const CameraState& camera : bundle.cameras) square += camera.position_world.squaredNorm();
-  for (std::size_t k = 1; k < bundle.cameras.size(); ++k)
-    way.segment<3>(6 * static_cast<Eigen::Index>(k - 1)) =
-        bundle.cameras[k].position_world / square;
+  double sum = 0.0;
+  for (const FeatureState& feature : bundle.features) sum += feature.inverse_depth;
+  Eigen::VectorXd depths = Eigen::VectorXd::Zero(size);
+  for (int i = 0; i < features; ++i) depths[first_feature + 3 * i + 2] = 1.0 / sum;
   // The lens stays as doubtful as it was and makes the rest so: what images tell of it is left out.
   std::vector<int> order(size);
   std::iota(order.begin(), order.end(), 0);
@@ -165,16 +160,12 @@ TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
       cross * I.topLeftCorner(size - 4, size - 4).inverse() * cross.transpose();
   I.diagonal().tail<4>() += options.sigma_calibration.tail<4>().array().square().inverse().matrix();
   information = lens_last * I * lens_last.transpose();
-  for (const BundleUnit unit : {BundleUnit::kDepths, BundleUnit::kWay}) {
-    const Eigen::VectorXd& scale = unit == BundleUnit::kDepths ? depths : way;
-    const Eigen::MatrixXd plain =
-        (information + scale * scale.transpose() / (scale_sigma * scale_sigma)).inverse();
-    const Eigen::MatrixXd covariance =
-        bundleCovariance(model, options, bundle, 2, unit, scale_sigma);
-    const int kept = size - 6;
-    ASSERT_EQ(covariance.rows(), kept);
-    EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
-  }
+  const Eigen::MatrixXd plain =
+      (information + depths * depths.transpose() / (scale_sigma * scale_sigma)).inverse();
+  const Eigen::MatrixXd covariance = bundleCovariance(model, options, bundle, 2, scale_sigma);
+  const int kept = size - 6;
+  ASSERT_EQ(covariance.rows(), kept);
+  EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
 }
 
 TEST(BundleAdjustment, NoOtherUnitFitsThePriorOfDepthsBetter) {
@@ -286,9 +277,8 @@ TEST(BundleAdjustment, NoisyImagePointsCountForLess) {
     for (BundleObservation& o : observations) o.noise = 2.0;
   BundleOptions twice_by_options = options;
   twice_by_options.sigma_px = 0.2;
-  const Eigen::MatrixXd a = bundleCovariance(model, options, twice, 1, BundleUnit::kDepths, 1e-3);
-  const Eigen::MatrixXd b =
-      bundleCovariance(model, twice_by_options, truth, 1, BundleUnit::kDepths, 1e-3);
+  const Eigen::MatrixXd a = bundleCovariance(model, options, twice, 1, 1e-3);
+  const Eigen::MatrixXd b = bundleCovariance(model, twice_by_options, truth, 1, 1e-3);
   EXPECT_LT((a - b).norm(), 1e-6 * b.norm());
 }
 

@@ -54,19 +54,13 @@ double chooseUnit(const BundleOptions& options, Bundle* bundle);
 /// the cost reached: minus twice the logarithm of the posterior, up to a constant.
 double adjustBundle(const CameraModel& model, const BundleOptions& options, Bundle* bundle);
 
-/// What tells the unit of length of a bundle whose scale is free.
-enum class BundleUnit {
-  kDepths,  ///< the mean logarithm of the inverse depths
-  kWay,     ///< the way of all cameras, which must not be zero
-};
-
 /// Covariance at a minimum, first order, of the cameras from `first_camera` on (position and
 /// rotation, 6 each, as in CameraError), of the calibration and then of all features (bearing and
 /// inverse depth, 3 each). Of the lens nothing is learnt: it is as uncertain as before and makes
-/// the rest so (a consider parameter; Schmidt 1966). `unit` is taken as known to
-/// `relative_scale_sigma`.
+/// the rest so (a consider parameter; Schmidt 1966). The unit of length is that in which the mean
+/// inverse depth is what it is, to `relative_scale_sigma`.
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
-                                 const Bundle& bundle, int first_camera, BundleUnit unit,
+                                 const Bundle& bundle, int first_camera,
                                  double relative_scale_sigma);
 
 /// Root mean square [px], per axis, of what image points miss of each feature's projections, over

@@ -32,10 +32,10 @@ struct AdjustedStart {
 /// and can't take back what it made of them: a turn read as a move, near and far exchanged. So the
 /// matches of the first images are kept, and when they show parallax, cameras and depths are
 /// adjusted together, from what the filter believes and, until the images have clearly settled it,
-/// from its opposites; the best, if it is clearly the best, becomes the filter's state. Repeated as
-/// parallax or time grow, also when the first image is out of sight, until depths are known well
-/// enough to be followed linearly, or the filter, which has seen every image, knows them clearly
-/// better than the images kept here tell.
+/// from its opposites; the best, if it is clearly the best, becomes the filter's state. Repeated
+/// with each image while there is little parallax, then as parallax or time grow, also when the
+/// first image is out of sight, until depths are known well enough to be followed linearly, or the
+/// filter, which has seen every image, knows them clearly better than the images kept here tell.
 class StartAdjustment {
  public:
   /// Starts anew with image `index`: `first` is where it shows the filter's features; its camera is
@@ -57,8 +57,8 @@ class StartAdjustment {
   /// Takes all lengths so far times `factor`, as the filter does when its scale becomes known.
   void rescale(double factor);
 
-  /// The adjusted state when it was time for one at the image before and the images left no doubt.
-  /// `model` as calibrated; the readout is adjusted too.
+  /// The adjusted state when it is time for one, or was at the image before, and the images leave
+  /// no doubt. `model` as calibrated; the readout is adjusted too.
   std::optional<AdjustedStart> adjust(const CameraModel& model, const Ekf& filter);
 
  private:
@@ -69,6 +69,7 @@ class StartAdjustment {
     std::vector<FeatureMeasurement> measurements;  ///< ascending id
     /// Speed [px/s] of each of them, by the images next to this one that show it; zero: none does.
     std::vector<Eigen::Vector2d> speeds;
+    double sigma_px = 0.0;  ///< of most of them; 0: unknown
   };
 
   /// One of the explanations of the images kept.
@@ -86,6 +87,7 @@ class StartAdjustment {
   std::optional<double> parallax(const CameraModel& model);
   bool isTime(double parallax_px, double sigma_px);
   std::vector<double> noiseOfFeatures(const std::vector<FeatureId>& ids) const;
+  std::vector<double> noiseOfImages() const;
   Bundle makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const;
   std::optional<Reading> chooseReading(const CameraModel& model, const Ekf& filter,
                                        double parallax_px) const;
@@ -101,9 +103,7 @@ class StartAdjustment {
   std::vector<FeatureState> features_;
   std::optional<Reading> chosen_;  ///< in the image before, to be adjusted now
   bool has_left_first_ = false;    ///< the last image shares too little with the first
-  bool is_unit_known_ = false;     ///< a scale was set
   bool is_settled_ = false;        ///< what the filter was given has no opposite any more
-  double unit_drift_ = 1.0;        ///< of the way's unit from the depths'
   double least_motion_px_ = 1.0;
   double last_parallax_px_ = 0.0;  ///< when adjusted last; zero: has not been
   double next_parallax_px_ = 0.0;  ///< to be adjusted at
