@@ -60,10 +60,12 @@ TEST_P(SimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
   EXPECT_LT(active.error_of_path, 1.5 * jcbb.error_of_path);
 }
 
-TEST_P(SimulatedRepetition, ActiveSearchAndRansacAloneLoseIt) {
+TEST_P(SimulatedRepetition, ActiveSearchAndRansacAloneLoseItOrErrMore) {
+  const BoardRun active = trackCheckerboard("active", GetParam(), true);
   for (const char* matcher : {"active_search", "one_point_ransac"}) {
     const BoardRun run = trackCheckerboard(matcher, GetParam(), false);
-    EXPECT_TRUE(run.tracked < run.frames || run.error_of_path > 0.015) << matcher;
+    EXPECT_TRUE(run.tracked < run.frames || run.error_of_path > 1.3 * active.error_of_path)
+        << matcher;
   }
 }
 

@@ -16,14 +16,14 @@ struct FilterOptions {
   double sigma_angular_acceleration_rps2 = 12.0;  ///< angular, per axis
   double sigma_px = 0.45;                         ///< measurement noise, per axis
   double minimum_sigma_px = 0.02;                 ///< of matches that show less; see MatchNoise
-  double corner_wander_px = 0.07;                 ///< per axis and root of a radian; see Ekf
+  double corner_wander_px = 0.035;                ///< per axis and root of a radian; see Ekf
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
   double initial_sigma_readout_s = 0.01;
-  double initial_sigma_focal = 0.001;  ///< these: see LensCorrection
+  double initial_sigma_focal = 0.0004;  ///< these: see LensCorrection
   double initial_sigma_radial = 0.002;
-  double initial_sigma_centre = 0.0006;
+  double initial_sigma_centre = 0.00025;
   /// Of each correction of the calibration, how much is made: 1 where errors of matches are white;
   /// those of images last, and teach less than so many of them should. See Ekf::update().
   double calibration_share = 0.6;
