@@ -311,10 +311,9 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
     covariance.block<3, 3>(kept + 3 * i, kept + 3 * i) +=
         reduced->inverse_roots[i].transpose() * reduced->inverse_roots[i];
   // The unit is known as well as said: one more measurement.
-  double sum = 0.0;
-  for (const FeatureState& feature : bundle.features) sum += feature.inverse_depth;
   Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.cols());
-  for (int i = 0; i < F; ++i) depths[kept + 3 * i + 2] = 1.0 / sum;
+  for (int i = 0; i < F; ++i)
+    depths[kept + 3 * i + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
   const Eigen::VectorXd along = lower * depths;
   const double variance = depths.dot(along);
   lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + variance));

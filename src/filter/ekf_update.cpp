@@ -74,7 +74,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
     report.healthy = false;
     return report;
   }
-  const std::vector<double> noise_left = correction.noiseLeft();
+  const std::vector<double>& noise_left = correction.noiseLeft();
   for (std::size_t i = 0; i < given.size(); ++i) report.noise_left[given[i]] = noise_left[i];
   correction.finish();
   impulse_.reset();

@@ -1,6 +1,7 @@
 #include "measurement_update.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 
 #include "active_matching_slam/filter/state_error.h"
 
@@ -64,28 +65,42 @@ void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) const {
   }
 }
 
-bool MeasurementUpdate::factorise(const Eigen::MatrixXd& S) {
-  llt_.compute(S);
-  if (llt_.info() != Eigen::Success) return false;
-  inverse_root_ = Eigen::MatrixXd::Identity(S.rows(), S.cols());
-  llt_.matrixL().solveInPlace(inverse_root_);
-  return true;
+/// U^-1 with S = U U^T, by columns that are zero above the diagonal.
+Eigen::MatrixXd MeasurementUpdate::inverseRoot() const {
+  constexpr Eigen::Index kColumns = 32;
+  const Eigen::Index n = llt_.rows();
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(n, n);
+  for (Eigen::Index k = 0; k < n; k += kColumns) {
+    auto columns = inverse.block(k, k, n - k, std::min(kColumns, n - k));
+    llt_.matrixLLT()
+        .bottomRightCorner(n - k, n - k)
+        .triangularView<Eigen::Lower>()
+        .solveInPlace(columns);
+  }
+  return inverse;
 }
 
 /// `weighted`: S^-1 y for the innovation y. Of what the others leave of y_i, the covariance is the
 /// inverse of that block of S^-1, and itself that times the block of S^-1 y. Whether there are any.
 bool MeasurementUpdate::doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S) {
+  const Eigen::MatrixXd inverse_root = inverseRoot();
   bool any = false;
-  for (std::size_t i = 0; i < measurements_.size(); ++i) {
-    const auto columns = inverse_root_.middleCols<2>(2 * i);
-    const Eigen::Matrix2d left_out = (columns.transpose() * columns).inverse();
+  noise_left_.clear();
+  for (Eigen::Index i = 0; i < weighted.size() / 2; ++i) {
+    const auto columns = inverse_root.block(2 * i, 2 * i, weighted.size() - 2 * i, 2);
+    Eigen::Matrix2d inverse = columns.transpose() * columns;  // block of S^-1
+    const Eigen::Matrix2d left_out = inverse.inverse();
     const Eigen::Vector2d w = weighted.segment<2>(2 * i);
     const double chi2 = w.dot(left_out * w);
-    if (!(chi2 > kStrayChi2)) continue;
-    const double more_px2 = 0.5 * left_out.trace() * (chi2 / kStrayChi2 - 1.0);
-    variances_px2_[i] += more_px2;
-    S.block<2, 2>(2 * i, 2 * i).diagonal().array() += more_px2;
-    any = true;
+    if (chi2 > kStrayChi2) {
+      const double more_px2 = 0.5 * left_out.trace() * (chi2 / kStrayChi2 - 1.0);
+      variances_px2_[i] += more_px2;
+      S.block<2, 2>(2 * i, 2 * i).diagonal().array() += more_px2;
+      inverse = (left_out + more_px2 * Eigen::Matrix2d::Identity()).inverse();
+      any = true;
+    }
+    // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
+    noise_left_.push_back(0.5 * variances_px2_[i] * inverse.trace());
   }
   return any;
 }
@@ -105,12 +120,14 @@ bool MeasurementUpdate::step(bool first) {
     innovation += stack_.times(delta_) + HC * (L_.transpose() * delta_);
   }
   addNoise(S);
-  if (!factorise(S)) return false;
+  llt_.compute(S);
+  if (llt_.info() != Eigen::Success) return false;
   Eigen::VectorXd weighted = llt_.solve(innovation);
   if (first) {
     nis_ = innovation.dot(weighted);
     if (doubtStrays(weighted, S)) {
-      if (!factorise(S)) return false;
+      llt_.compute(S);
+      if (llt_.info() != Eigen::Success) return false;
       weighted = llt_.solve(innovation);
     }
   }
@@ -143,14 +160,6 @@ bool MeasurementUpdate::solve(int iterations) {
     if (isLinearEnough(last_stack.pixels() + last_stack.times(delta_ - last_delta))) break;
   }
   return true;
-}
-
-std::vector<double> MeasurementUpdate::noiseLeft() const {
-  // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
-  std::vector<double> left;
-  for (std::size_t i = 0; i < measurements_.size(); ++i)
-    left.push_back(0.5 * variances_px2_[i] * inverse_root_.middleCols<2>(2 * i).squaredNorm());
-  return left;
 }
 
 void MeasurementUpdate::finish() { llt_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(X_); }

@@ -39,8 +39,8 @@ class MeasurementUpdate {
   const CameraState& camera() const { return camera_; }
   const std::vector<FeatureState>& features() const { return features_; }
   double nis() const { return nis_; }
-  /// UpdateReport::noise_left of each measurement; after solve().
-  std::vector<double> noiseLeft() const;
+  /// UpdateReport::noise_left of each measurement, by the first linearisation; after solve().
+  const std::vector<double>& noiseLeft() const { return noise_left_; }
   const Eigen::MatrixXd& gaugeChange() const { return C_; }       ///< state size x kGaugeFreedoms
   const Eigen::MatrixXd& gaugeFunctionals() const { return L_; }  ///< likewise
   const Eigen::MatrixXd& gaugeCovariance() const { return PL_; }  ///< P L
@@ -49,7 +49,7 @@ class MeasurementUpdate {
   bool linearise();
   bool step(bool first);
   void addNoise(Eigen::MatrixXd& S) const;
-  bool factorise(const Eigen::MatrixXd& S);
+  Eigen::MatrixXd inverseRoot() const;
   bool doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S);
   bool isLinearEnough(const Eigen::VectorXd& expected_pixels) const;
 
@@ -68,7 +68,7 @@ class MeasurementUpdate {
   Eigen::MatrixXd prior_gauge_, C_, L_, PL_;
   std::vector<double> variances_px2_;  ///< of the measurements, as far as they agree
   Eigen::LLT<Eigen::MatrixXd> llt_;
-  Eigen::MatrixXd inverse_root_;          ///< U^-1
+  std::vector<double> noise_left_;
   std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points
   double nis_ = 0.0;
 };

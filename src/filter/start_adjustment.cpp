@@ -16,7 +16,7 @@ namespace {
 
 /// Parallax: adjusted first at [sigma of the noise of image points], with every image until it is
 /// so much [px], and no more beyond.
-constexpr double kFirstParallaxSigmas = 0.75, kEveryImageUpToPx = 3.0, kLastParallaxPx = 20.0;
+constexpr double kFirstParallaxSigmas = 0.75, kEveryImageUpToPx = 2.0, kLastParallaxPx = 20.0;
 constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next, then
 /// Share of the points: where most are as far as each other, the few that are near tell the motion.
 constexpr double kAllButNear = 0.75;

@@ -1,6 +1,7 @@
 #include "start_bundle.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -85,12 +86,11 @@ void adjustByItsNoise(const CameraModel& model, double noise_px, BundleOptions* 
 }
 
 double depthFactor(const Bundle& before, const Bundle& bundle) {
-  double sum = 0.0, sum_before = 0.0;
-  for (std::size_t i = 0; i < bundle.features.size(); ++i) {
-    sum += bundle.features[i].inverse_depth;
-    sum_before += before.features[i].inverse_depth;
-  }
-  return sum / sum_before;
+  std::vector<double> logarithms;
+  for (std::size_t i = 0; i < bundle.features.size(); ++i)
+    logarithms.push_back(
+        std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth));
+  return std::exp(medianOf(std::move(logarithms)));
 }
 
 }  // namespace active_matching_slam

@@ -18,7 +18,7 @@ BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options);
 void adjustByItsNoise(const CameraModel& model, double noise_px, BundleOptions* options,
                       Bundle* reading, Bundle* believed, std::vector<FeatureId>* ids);
 
-/// The factor for lengths by which the mean of the inverse depths is what it was. Both bundles have
+/// The factor for lengths by which the median of the inverse depths stays. Both bundles have
 /// the same features.
 double depthFactor(const Bundle& before, const Bundle& bundle);
 

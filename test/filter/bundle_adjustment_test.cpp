@@ -144,10 +144,9 @@ TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
     const int row = first_feature + 3 * i + 2;
     information(row, row) += 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
   }
-  double sum = 0.0;
-  for (const FeatureState& feature : bundle.features) sum += feature.inverse_depth;
   Eigen::VectorXd depths = Eigen::VectorXd::Zero(size);
-  for (int i = 0; i < features; ++i) depths[first_feature + 3 * i + 2] = 1.0 / sum;
+  for (int i = 0; i < features; ++i)
+    depths[first_feature + 3 * i + 2] = 1.0 / (features * bundle.features[i].inverse_depth);
   // The lens stays as doubtful as it was and makes the rest so: what images tell of it is left out.
   std::vector<int> order(size);
   std::iota(order.begin(), order.end(), 0);

@@ -58,7 +58,7 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
 /// rotation, 6 each, as in CameraError), of the calibration and then of all features (bearing and
 /// inverse depth, 3 each). Of the lens nothing is learnt: it is as uncertain as before and makes
 /// the rest so (a consider parameter; Schmidt 1966). The unit of length is that in which the mean
-/// inverse depth is what it is, to `relative_scale_sigma`.
+/// logarithm of the inverse depths is what it is, to `relative_scale_sigma`.
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera,
                                  double relative_scale_sigma);
