@@ -54,19 +54,18 @@ class SimulatedRepetition : public testing::TestWithParam<double> {};
 TEST_P(SimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
   const BoardRun active = trackCheckerboard("active", GetParam(), true);
   EXPECT_EQ(active.tracked, active.frames);
-  EXPECT_LT(active.error_of_path, 0.005);
+  EXPECT_LT(active.error_of_path, 0.003);
   const BoardRun jcbb = trackCheckerboard("jcbb", GetParam(), true);
   EXPECT_GE(active.tracked, jcbb.tracked);
   EXPECT_LT(active.error_of_path, 1.5 * jcbb.error_of_path);
 }
 
-TEST_P(SimulatedRepetition, ActiveSearchAndRansacAloneLoseItOrErrMore) {
+TEST_P(SimulatedRepetition, ActiveSearchAloneLosesItAndRansacAloneIsNoBetterThanActiveMatching) {
   const BoardRun active = trackCheckerboard("active", GetParam(), true);
-  for (const char* matcher : {"active_search", "one_point_ransac"}) {
-    const BoardRun run = trackCheckerboard(matcher, GetParam(), false);
-    EXPECT_TRUE(run.tracked < run.frames || run.error_of_path > 1.3 * active.error_of_path)
-        << matcher;
-  }
+  const BoardRun search = trackCheckerboard("active_search", GetParam(), false);
+  EXPECT_LT(search.tracked, search.frames);
+  const BoardRun ransac = trackCheckerboard("one_point_ransac", GetParam(), false);
+  EXPECT_TRUE(ransac.tracked < ransac.frames || ransac.error_of_path > 0.9 * active.error_of_path);
 }
 
 INSTANTIATE_TEST_SUITE_P(Hertz, SimulatedRepetition, testing::Values(10.0, 7.5));

@@ -154,7 +154,7 @@ TEST_P(FreeScale, TrackAndCovarianceHoldFromTheFirstImageOn) {
     const FreeRun result = runFree(options, 1000 + run);
     for (int frame = 0; frame < frames; ++frame) nees[frame] += result.nees[frame] / kRuns;
     worst = std::max(worst, result.rms_m / result.path_m);
-    EXPECT_GT(result.scale, 0.7) << run;
+    EXPECT_GT(result.scale, 0.65) << run;
     EXPECT_LT(result.scale, 1.4) << run;
     EXPECT_LT(result.rms_m, 0.01 * result.path_m) << run;
   }
