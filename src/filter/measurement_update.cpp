@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <utility>
 
 #include "active_matching_slam/filter/state_error.h"
 
@@ -18,23 +19,22 @@ constexpr double kStrayChi2 = 9.0;
 MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState& camera,
                                      const std::vector<FeatureState>& features,
                                      const CovarianceMatrix& covariance,
-                                     const std::vector<UsableMeasurement>& measurements,
+                                     std::vector<UsableMeasurement> measurements,
                                      double calibration_share, Eigen::Ref<Eigen::MatrixXd> X)
     : model_(model),
       prior_camera_(camera),
       prior_features_(features),
       covariance_(covariance),
-      measurements_(measurements),
+      measurements_(std::move(measurements)),
       calibration_share_(calibration_share),
       X_(X),
       camera_(camera),
       features_(features) {
   const int n = covariance.size();
-  z_.resize(2 * measurements.size());
-  for (std::size_t i = 0; i < measurements.size(); ++i) {
-    z_.segment<2>(2 * i) = measurements[i].pixel;
-    variances_px2_.push_back(measurements[i].variance_px2);
-    const FeatureState& feature = features[measurements[i].feature];
+  z_.resize(2 * measurements_.size());
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    z_.segment<2>(2 * i) = measurements_[i].pixel;
+    const FeatureState& feature = features[measurements_[i].feature];
     moments_.push_back(feature.kind == FeatureKind::kInverseDepth
                            ? relativeCovariance(feature, covariance)
                            : Eigen::Matrix4d(Eigen::Matrix4d::Zero()));
@@ -60,7 +60,7 @@ bool MeasurementUpdate::linearise() {
 void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) const {
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     auto block = S.block<2, 2>(2 * i, 2 * i);
-    block.diagonal().array() += variances_px2_[i];
+    block.diagonal().array() += measurements_[i].variance_px2;
     if (moments_[i](3, 3) > 0.0) block += secondOrderNoise(stack_.projection(i), moments_[i]);
   }
 }
@@ -94,13 +94,13 @@ bool MeasurementUpdate::doubtStrays(const Eigen::VectorXd& weighted, Eigen::Matr
     const double chi2 = w.dot(left_out * w);
     if (chi2 > kStrayChi2) {
       const double more_px2 = 0.5 * left_out.trace() * (chi2 / kStrayChi2 - 1.0);
-      variances_px2_[i] += more_px2;
+      measurements_[i].variance_px2 += more_px2;
       S.block<2, 2>(2 * i, 2 * i).diagonal().array() += more_px2;
       inverse = (left_out + more_px2 * Eigen::Matrix2d::Identity()).inverse();
       any = true;
     }
     // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
-    noise_left_.push_back(0.5 * variances_px2_[i] * inverse.trace());
+    noise_left_.push_back(0.5 * measurements_[i].variance_px2 * inverse.trace());
   }
   return any;
 }
@@ -144,8 +144,8 @@ bool MeasurementUpdate::step(bool first) {
 bool MeasurementUpdate::isLinearEnough(const Eigen::VectorXd& expected) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
-    sum +=
-        (stack_.projection(i).pixel - expected.segment<2>(2 * i)).squaredNorm() / variances_px2_[i];
+    sum += (stack_.projection(i).pixel - expected.segment<2>(2 * i)).squaredNorm() /
+           measurements_[i].variance_px2;
   }
   return sum < kNonlinearityTolerance * kNonlinearityTolerance * expected.size();
 }

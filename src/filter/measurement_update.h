@@ -27,7 +27,7 @@ class MeasurementUpdate {
   /// the calibration gets.
   MeasurementUpdate(const CameraModel& model, const CameraState& camera,
                     const std::vector<FeatureState>& features, const CovarianceMatrix& covariance,
-                    const std::vector<UsableMeasurement>& measurements, double calibration_share,
+                    std::vector<UsableMeasurement> measurements, double calibration_share,
                     Eigen::Ref<Eigen::MatrixXd> X);
 
   /// False when S could not be factorised or the result is not finite: nothing is to be fused.
@@ -57,7 +57,7 @@ class MeasurementUpdate {
   const CameraState& prior_camera_;
   const std::vector<FeatureState>& prior_features_;
   const CovarianceMatrix& covariance_;
-  const std::vector<UsableMeasurement>& measurements_;
+  std::vector<UsableMeasurement> measurements_;  ///< strays with the noise that they are given
   const double calibration_share_;
   Eigen::Ref<Eigen::MatrixXd> X_;  ///< P H^T, at the end P H^T U^-T with S = U U^T
 
@@ -66,7 +66,6 @@ class MeasurementUpdate {
   MeasurementStack stack_;
   Eigen::VectorXd z_, delta_;
   Eigen::MatrixXd prior_gauge_, C_, L_, PL_;
-  std::vector<double> variances_px2_;  ///< of the measurements, as far as they agree
   Eigen::LLT<Eigen::MatrixXd> llt_;
   std::vector<double> noise_left_;
   std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points

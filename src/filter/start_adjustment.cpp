@@ -116,7 +116,7 @@ std::optional<double> parallaxBetween(const CameraModel& model,
 
 void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasurement>& first) {
   is_active_ = true;
-  images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size()), medianSigma(first)});
+  images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
   features_.clear();
   has_left_first_ = is_settled_ = false;
   least_motion_px_ = 1.0;
