@@ -240,6 +240,41 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
   }
 }
 
+/// Calls visit(image, observation, square of what it misses per axis) for all that project.
+template <typename Visit>
+void forEachMiss(const CameraModel& model, const Bundle& bundle, const Visit& visit) {
+  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
+    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
+    for (const BundleObservation& o : bundle.observations[k]) {
+      Matrix26 d_pose;
+      const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
+                                              bundle.features[o.feature], &d_pose);
+      if (projection) visit(k, o, 0.5 * squaredMiss(o, plainPixel(bundle, o) - projection->pixel));
+    }
+  }
+}
+
+class MeanSquares {
+ public:
+  explicit MeanSquares(std::size_t size) : sums_(size, 0.0), counts_(size, 0.0) {}
+
+  void add(std::size_t i, double square) {
+    sums_[i] += square;
+    counts_[i] += 1.0;
+  }
+
+  /// Zero where there are none.
+  std::vector<double> roots() const {
+    std::vector<double> roots(sums_.size(), 0.0);
+    for (std::size_t i = 0; i < roots.size(); ++i)
+      if (counts_[i] > 0.0) roots[i] = std::sqrt(sums_[i] / counts_[i]);
+    return roots;
+  }
+
+ private:
+  std::vector<double> sums_, counts_;
+};
+
 }  // namespace
 
 void rescaleBundle(double factor, Bundle* bundle) {
@@ -322,21 +357,19 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
 }
 
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle) {
-  std::vector<double> squares(bundle.features.size(), 0.0), counts(bundle.features.size(), 0.0);
-  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
-    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
-    for (const BundleObservation& o : bundle.observations[k]) {
-      Matrix26 d_pose;
-      const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
-                                              bundle.features[o.feature], &d_pose);
-      if (!projection) continue;
-      squares[o.feature] += 0.5 * squaredMiss(o, plainPixel(bundle, o) - projection->pixel);
-      counts[o.feature] += 1.0;
-    }
-  }
-  for (std::size_t i = 0; i < squares.size(); ++i)
-    squares[i] = counts[i] > 0.0 ? std::sqrt(squares[i] / counts[i]) : 0.0;
-  return squares;
+  MeanSquares errors(bundle.features.size());
+  forEachMiss(model, bundle, [&errors](std::size_t, const BundleObservation& o, double squared_px) {
+    errors.add(o.feature, squared_px);
+  });
+  return errors.roots();
+}
+
+std::vector<double> imageErrors(const CameraModel& model, const Bundle& bundle, double most_px) {
+  MeanSquares errors(bundle.cameras.size());
+  forEachMiss(model, bundle, [&](std::size_t k, const BundleObservation&, double squared_px) {
+    errors.add(k, std::min(squared_px, most_px * most_px));
+  });
+  return errors.roots();
 }
 
 void alignRotation(const CameraModel& model, int index, Bundle* bundle) {

@@ -26,7 +26,6 @@ constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and c
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
-constexpr double kSharpestImage = 0.5, kMostBlurredImage = 5.0;  ///< likewise
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
 constexpr double kSettlingLead = 20.0, kSettlingParallaxPx = 2.0;
@@ -228,19 +227,6 @@ std::vector<double> StartAdjustment::noiseOfFeatures(const std::vector<FeatureId
   return noise;
 }
 
-/// Standard deviation of most matches of each image, in that of most images.
-std::vector<double> StartAdjustment::noiseOfImages() const {
-  std::vector<double> known_px, noise;
-  for (const Image& image : images_)
-    if (image.sigma_px > 0.0) known_px.push_back(image.sigma_px);
-  const double most_px = medianOf(std::move(known_px));
-  for (const Image& image : images_)
-    noise.push_back(image.sigma_px > 0.0
-                        ? std::clamp(image.sigma_px / most_px, kSharpestImage, kMostBlurredImage)
-                        : 1.0);
-  return noise;
-}
-
 Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const {
   Bundle bundle;
   for (const FeatureState& feature : features_) {
@@ -251,7 +237,7 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
     ids->push_back(feature.id);
     bundle.features.push_back(seenFromOrigin(feature));
   }
-  const std::vector<double> of_features = noiseOfFeatures(*ids), of_images = noiseOfImages();
+  const std::vector<double> of_features = noiseOfFeatures(*ids);
   for (std::size_t k = 0; k < images_.size(); ++k) {
     const Image& image = images_[k];
     bundle.cameras.push_back(image.camera);
@@ -261,7 +247,7 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
       const auto it = std::lower_bound(ids->begin(), ids->end(), m.id);
       if (it == ids->end() || *it != m.id) continue;
       BundleObservation o{static_cast<int>(it - ids->begin()), m.pixel};
-      o.noise = of_features[o.feature] * of_images[k];
+      o.noise = of_features[o.feature];
       o.d_calibration << rowShare(model, m.pixel.y()) * image.speeds[i],
           model.pixelByCorrection(m.pixel);
       bundle.observations.back().push_back(o);
@@ -302,7 +288,7 @@ std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const Cam
   if (is_settled_) {
     const double cost = adjustBundle(model, withDepthsOf(chosen.bundle, options), &chosen.bundle);
     if (costsTooMuch(cost, chosen.bundle)) return std::nullopt;
-    chosen.noise_px = noiseOf(model, chosen.bundle);
+    chosen.is_adjusted = true;
     return chosen;
   }
   auto best = bestReading(model, options, chosen.bundle, last_parallax_px_ == 0.0);
@@ -346,12 +332,8 @@ std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model,
   chooseUnit(startOptions(filter.options()), &reading);  // that of `chosen`
   reading = continued(chosen, reading, ids);
   BundleOptions options = withDepthsOf(reading, startOptions(filter.options()));
-  double noise_px = chosen.noise_px;
-  if (noise_px == 0.0) {
-    adjustBundle(model, options, &reading);
-    noise_px = noiseOf(model, reading);
-  }
-  adjustByItsNoise(model, noise_px, &options, &reading, &believed, &ids);
+  if (!chosen.is_adjusted) adjustBundle(model, options, &reading);
+  adjustByItsNoise(model, &options, &reading, &believed, &ids);
   // Others have seen the map: its unit of length stays.
   rescaleBundle(depthFactor(believed, reading), &reading);
   auto start = makeAdjustedStart(model, filter, options, reading, ids, images_.back().interval_s);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "active_matching_slam/filter/quantile.h"
+#include "start_readings.h"
 
 namespace active_matching_slam {
 namespace {
@@ -15,7 +16,11 @@ constexpr double kDepthSpread = 3.5;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.12;
 /// What an adjustment takes for the noise of image points, by what they show (by NEES over rendered
 /// runs), and at least.
-constexpr double kShareOfNoise = 0.9, kLeastNoisePx = 0.005;
+constexpr double kShareOfNoise = 0.88, kLeastNoisePx = 0.005;
+/// No image point counts for more than so many times what features miss on the whole (median).
+constexpr double kMostMiss = 3.0;
+/// Points for which an image is taken to be as noisy as most.
+constexpr double kPointsLikeOthers = 10.0;
 
 /// Median distance of the inverse depths to one.
 double medianDeviation(const Bundle& bundle, double inverse_depth) {
@@ -51,6 +56,23 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
   }
 }
 
+/// Image points are as noisy, in that of most images, as what those of their image miss shows: of
+/// one that is blurred all are worse (variance components; Foerstner 1979). The first image, from
+/// which all is told, counts as most do.
+void weighImages(const CameraModel& model, Bundle* bundle) {
+  const double most_px = kMostMiss * medianOf(featureErrors(model, *bundle));
+  const std::vector<double> errors_px = imageErrors(model, *bundle, most_px);
+  const double median_px = medianOf({errors_px.begin() + 1, errors_px.end()});
+  if (!(median_px > 0.0)) return;
+  for (std::size_t k = 1; k < errors_px.size(); ++k) {
+    auto& observations = bundle->observations[k];
+    const double points = static_cast<double>(observations.size());
+    const double squares = points * std::pow(errors_px[k] / median_px, 2);
+    const double noise = std::sqrt((kPointsLikeOthers + squares) / (kPointsLikeOthers + points));
+    for (BundleObservation& o : observations) o.noise *= noise;
+  }
+}
+
 }  // namespace
 
 BundleOptions startOptions(const FilterOptions& filter) {
@@ -71,8 +93,10 @@ BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options) {
   return options;
 }
 
-void adjustByItsNoise(const CameraModel& model, double noise_px, BundleOptions* options,
-                      Bundle* reading, Bundle* believed, std::vector<FeatureId>* ids) {
+void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* reading,
+                      Bundle* believed, std::vector<FeatureId>* ids) {
+  weighImages(model, reading);
+  const double noise_px = noiseOf(model, *reading);
   // Corners where something near hides something far wander by less than would make them outliers;
   // most image points are much better than that.
   options->outlier_px =

@@ -13,10 +13,11 @@ BundleOptions startOptions(const FilterOptions& filter);
 /// The options for what is of such depths as `reading`.
 BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options);
 
-/// Adjusts all of `reading` by the noise that it shows, `noise_px`, and leaves features that wander
-/// out of it, of `believed` and of `ids`. `options` keeps the lower noise.
-void adjustByItsNoise(const CameraModel& model, double noise_px, BundleOptions* options,
-                      Bundle* reading, Bundle* believed, std::vector<FeatureId>* ids);
+/// Adjusts all of the adjusted `reading` once more, by the noise that it shows as a whole and that
+/// each of its images shows, and leaves features that wander out of it, of `believed` and of `ids`.
+/// `options` keeps the noise of the whole.
+void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* reading,
+                      Bundle* believed, std::vector<FeatureId>* ids);
 
 /// The factor for lengths by which the median of the inverse depths stays. Both bundles have
 /// the same features.

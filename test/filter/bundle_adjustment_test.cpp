@@ -245,6 +245,21 @@ TEST(BundleAdjustment, AWanderingFeatureHardlyMovesTheRest) {
   EXPECT_LT(errors[6], 0.3);
 }
 
+TEST(BundleAdjustment, ErrorsOfImagesAreThoseOfTheirPoints) {
+  const CameraModel model(exampleCalibration());
+  Bundle bundle = exampleBundle(model, 4, 30, 0.05, 0.0, 4);
+  for (BundleObservation& o : bundle.observations[2]) o.pixel += Eigen::Vector2d(0.3, -0.4);
+  bundle.observations[3].clear();
+  bundle.observations[1][0].pixel.x() += 100.0;
+  const double points = static_cast<double>(bundle.observations[1].size());
+  const std::vector<double> errors_px = imageErrors(model, bundle, 1.0);
+  ASSERT_EQ(errors_px.size(), 4u);
+  EXPECT_NEAR(errors_px[0], 0.0, 1e-9);
+  EXPECT_NEAR(errors_px[1], std::sqrt(1.0 / points), 1e-9);  // one counts for one pixel
+  EXPECT_NEAR(errors_px[2], std::sqrt(0.5) * 0.5, 1e-9);     // per axis
+  EXPECT_EQ(errors_px[3], 0.0);
+}
+
 TEST(BundleAdjustment, NoisyImagePointsCountForLess) {
   const CameraModel model(exampleCalibration());
   const Bundle truth = exampleBundle(model, 8, 30, 0.05, 0.0, 4);

@@ -79,7 +79,7 @@ class StartAdjustment {
     double parallax_px = 0.0;
     double lead = 0.0;                 ///< see ChosenReading; zero: its opposites were not asked
     std::vector<std::int64_t> images;  ///< of its cameras
-    double noise_px = 0.0;             ///< zero: some of the images kept have not been adjusted yet
+    bool is_adjusted = false;          ///< all of its images
   };
 
   void thinOut();
@@ -87,7 +87,6 @@ class StartAdjustment {
   std::optional<double> parallax(const CameraModel& model);
   bool isTime(double parallax_px, double sigma_px);
   std::vector<double> noiseOfFeatures(const std::vector<FeatureId>& ids) const;
-  std::vector<double> noiseOfImages() const;
   Bundle makeBundle(const CameraModel& model, std::vector<FeatureId>* ids) const;
   std::optional<Reading> chooseReading(const CameraModel& model, const Ekf& filter,
                                        double parallax_px) const;
