@@ -228,7 +228,8 @@ TEST(StartAdjustment, OneWrongMatchDoesNotMakeTheMoveAnother) {
 }
 
 TEST(StartAdjustment, ABlurredImageCountsForLess) {
-  // Nobody tells that every other image is five times as noisy; they tell hardly less than none.
+  // Every other image is far noisier, which nobody tells: with these the result is no worse than
+  // without.
   constexpr int kRuns = 8, kLast = 11;
   double with = 0.0, without = 0.0;  // squared errors of the depths, in the unit that fits best
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
