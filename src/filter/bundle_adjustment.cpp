@@ -75,10 +75,10 @@ double depthCost(const BundleOptions& options, const Bundle& bundle) {
   return squares / (options.sigma_inverse_depth * options.sigma_inverse_depth);
 }
 
-/// Calls visit(image, image point, its squaredMiss()) for all; empty where the feature does not
-/// project.
-template <typename Visit>
-void forEachMiss(const CameraModel& model, const Bundle& bundle, const Visit& visit) {
+double bundleCost(const CameraModel& model, const BundleOptions& options, const Bundle& bundle) {
+  double cost =
+      depthCost(options, bundle) +
+      bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
   for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
     const CameraState& camera = bundle.cameras[k];
     const Eigen::Matrix3d R_camera_world = camera.q_world_camera.toRotationMatrix().transpose();
@@ -86,20 +86,10 @@ void forEachMiss(const CameraModel& model, const Bundle& bundle, const Visit& vi
       const FeatureState& feature = bundle.features[o.feature];
       const auto pixel = model.project(
           R_camera_world * (feature.bearing_world - feature.inverse_depth * camera.position_world));
-      visit(k, o,
-            pixel ? std::optional(squaredMiss(o, plainPixel(bundle, o) - *pixel)) : std::nullopt);
+      cost += pixel ? robustCost(options, squaredMiss(o, plainPixel(bundle, o) - *pixel))
+                    : kCostOfInvisible;
     }
   }
-}
-
-double bundleCost(const CameraModel& model, const BundleOptions& options, const Bundle& bundle) {
-  double cost =
-      depthCost(options, bundle) +
-      bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
-  forEachMiss(model, bundle,
-              [&](std::size_t, const BundleObservation&, std::optional<double> squared_px) {
-                cost += squared_px ? robustCost(options, *squared_px) : kCostOfInvisible;
-              });
   return cost;
 }
 
@@ -250,6 +240,20 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
   }
 }
 
+/// Calls visit(image, observation, square of what it misses per axis) for all that project.
+template <typename Visit>
+void forEachMiss(const CameraModel& model, const Bundle& bundle, const Visit& visit) {
+  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
+    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
+    for (const BundleObservation& o : bundle.observations[k]) {
+      Matrix26 d_pose;
+      const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
+                                              bundle.features[o.feature], &d_pose);
+      if (projection) visit(k, o, 0.5 * squaredMiss(o, plainPixel(bundle, o) - projection->pixel));
+    }
+  }
+}
+
 class MeanSquares {
  public:
   explicit MeanSquares(std::size_t size) : sums_(size, 0.0), counts_(size, 0.0) {}
@@ -354,19 +358,17 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
 
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle) {
   MeanSquares errors(bundle.features.size());
-  forEachMiss(model, bundle,
-              [&](std::size_t, const BundleObservation& o, std::optional<double> squared_px) {
-                if (squared_px) errors.add(o.feature, 0.5 * *squared_px);
-              });
+  forEachMiss(model, bundle, [&errors](std::size_t, const BundleObservation& o, double squared_px) {
+    errors.add(o.feature, squared_px);
+  });
   return errors.roots();
 }
 
 std::vector<double> imageErrors(const CameraModel& model, const Bundle& bundle, double most_px) {
   MeanSquares errors(bundle.cameras.size());
-  forEachMiss(model, bundle,
-              [&](std::size_t k, const BundleObservation&, std::optional<double> squared_px) {
-                if (squared_px) errors.add(k, std::min(0.5 * *squared_px, most_px * most_px));
-              });
+  forEachMiss(model, bundle, [&](std::size_t k, const BundleObservation&, double squared_px) {
+    errors.add(k, std::min(squared_px, most_px * most_px));
+  });
   return errors.roots();
 }
 
