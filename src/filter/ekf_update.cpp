@@ -51,13 +51,16 @@ UpdateReport Ekf::update(const CameraModel& camera,
   std::vector<UsableMeasurement> usable;
   std::vector<std::size_t> given;  // places of those in `measurements`
   report.noise_left.assign(measurements.size(), 0.0);
+  report.left_px.assign(measurements.size(), Eigen::Vector2d::Zero());
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     const FeatureMeasurement& m = measurements[i];
     const int index = indexOf(m.id);
     if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px)) continue;
     if (!projectFeature(lens, camera_, features_[index])) continue;
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
-    usable.push_back({index, m.pixel, sigma_px * sigma_px});
+    const double variance_px2 = sigma_px * sigma_px;
+    usable.push_back({index, m.pixel, variance_px2,
+                      m.repetitions > 1.0 ? (m.repetitions - 1.0) * variance_px2 : 0.0});
     given.push_back(i);
   }
   report.skipped = static_cast<int>(measurements.size() - usable.size());
@@ -74,9 +77,11 @@ UpdateReport Ekf::update(const CameraModel& camera,
     report.healthy = false;
     return report;
   }
-  const std::vector<double>& noise_left = correction.noiseLeft();
-  for (std::size_t i = 0; i < given.size(); ++i) report.noise_left[given[i]] = noise_left[i];
-  correction.finish();
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    report.noise_left[given[i]] = correction.noiseLeft()[i];
+    report.left_px[given[i]] = correction.leftPx()[i];
+  }
+  const Eigen::MatrixXd more = correction.finish();
   impulse_.reset();
   camera_ = correction.camera();
   features_ = correction.features();
@@ -87,7 +92,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
           CameraError::kReadout, CameraError::kReadout);
   const auto calibration_before = calibration.eval();
   report.healthy = correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
-                                     correction.gaugeCovariance(), rows, X);
+                                     correction.gaugeCovariance(), more, rows, X);
   const double not_made = 1.0 - options_.calibration_share;
   calibration += not_made * not_made * (calibration_before - calibration);
   limitInverseDepths();
@@ -95,15 +100,19 @@ UpdateReport Ekf::update(const CameraModel& camera,
 }
 
 bool Ekf::correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
-                            const Eigen::MatrixXd& PL, int columns, Eigen::Ref<Eigen::MatrixXd> X) {
+                            const Eigen::MatrixXd& PL, const Eigen::MatrixXd& more, int columns,
+                            Eigen::Ref<Eigen::MatrixXd> X) {
+  constexpr int kMotion = CameraError::kMotionSize;
   auto P = covariance_.view();
   const Eigen::VectorXd variances_before = P.diagonal();
   const auto measured = X.leftCols(columns);
 
-  // With P' = P - X X^T: M P' M^T = P' + C Y^T + Y C^T for Y = P' L + C (L^T P' L) / 2, and each
-  // column adds a difference of two squares: c y^T + y c^T = (a a^T - b b^T) / 2 with a = s c + y /
-  // s, b = s c - y / s. The b join the columns of X.
+  // With P' = P - X X^T - D: M P' M^T = P' + C Y^T + Y C^T for Y = P' L + C (L^T P' L) / 2, and
+  // each column adds a difference of two squares: c y^T + y c^T = (a a^T - b b^T) / 2 with a = s c
+  // + y / s, b = s c - y / s. The b join the columns of X.
   Eigen::MatrixXd Y = PL - measured * (measured.transpose() * L);
+  Y.topRows<kMotion>() -= more * L - more.leftCols<kMotion>() * L.topRows<kMotion>();
+  Y.noalias() -= more.transpose() * L.topRows<kMotion>();
   Y += 0.5 * C * (L.transpose() * Y).eval();
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(P.rows(), kGaugeFreedoms);
   auto B = X.middleCols<kGaugeFreedoms>(columns);
@@ -117,6 +126,7 @@ bool Ekf::correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
   }
   P.selfadjointView<Eigen::Lower>().rankUpdate(X, -1.0);
   P.selfadjointView<Eigen::Lower>().rankUpdate(A, 1.0);
+  P.leftCols<kMotion>() -= more.transpose();
   const bool sound = repairVariances(variances_before);
   covariance_.mirrorLower();
   return sound;

@@ -13,12 +13,14 @@ namespace {
 
 constexpr std::size_t kLeastMatches = 8;
 constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once there are many
-/// What a patch is off in its own way, in what images tell of it, and the motion of the image after
-/// which it is another: it is weighed as white noise of so many times the variance as images show
-/// the same. (By NEES over rendered runs.)
-constexpr double kUnseen = 0.56;
-constexpr double kFreshPx = 6.0;
-constexpr double kMostRepetitions = 50.0;
+/// What a patch is off that updates do not show, in what images tell of it. (By NEES over rendered
+/// runs, as are the next.)
+constexpr double kUnseen = 0.3;
+/// Of the variance of matches, the share that lasts, and the motion of the image after which it is
+/// another.
+constexpr double kLastingShare = 0.5;
+constexpr double kFreshPx = 50.0;
+constexpr double kMostRepetitions = 300.0;
 /// Power of what images tell by which corners wander more. (By the same.)
 constexpr double kWanderByMisfit = 2.0;
 constexpr double kSharpest = 0.2, kMostBlurred = 5.0;  ///< image, in what most tell
@@ -49,7 +51,7 @@ void MatchNoise::seeMotion(std::vector<double> motions_px) {
   const double motion_px = motions_px.size() < kLeastMatches
                                ? std::numeric_limits<double>::infinity()
                                : medianOf(std::move(motions_px));
-  repetitions_ = kFreshPx < kMostRepetitions * motion_px ? std::max(1.0, kFreshPx / motion_px)
+  same_images_ = kFreshPx < kMostRepetitions * motion_px ? std::max(1.0, kFreshPx / motion_px)
                                                          : kMostRepetitions;
 }
 
@@ -61,6 +63,8 @@ void MatchNoise::see(std::vector<double> sigmas_px) {
   if (seen_px_ > 0.0) of_image_ = std::clamp(now_px / seen_px_, kSharpest, kMostBlurred);
 }
 
+double MatchNoise::repetitions() const { return 1.0 + kLastingShare * (same_images_ - 1.0); }
+
 double MatchNoise::likeMost(const FeatureNoise& feature) const {
   if (!(feature.seen_px() > 0.0) || !(seen_px_ > 0.0)) return 1.0;
   return std::pow(feature.seen_px() / seen_px_, kWanderByMisfit);
@@ -69,7 +73,7 @@ double MatchNoise::likeMost(const FeatureNoise& feature) const {
 double MatchNoise::sigma_px(const FilterOptions& options) const {
   if (updates_ == 0) return options.sigma_px;
   const double sigma_px =
-      of_image_ * std::sqrt(shown_px2_ + repetitions_ * kUnseen * kUnseen * seen_px_ * seen_px_);
+      of_image_ * std::sqrt(shown_px2_ + kUnseen * kUnseen * seen_px_ * seen_px_);
   return std::min(options.sigma_px, std::max(options.minimum_sigma_px, sigma_px));
 }
 

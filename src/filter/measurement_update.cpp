@@ -130,8 +130,17 @@ bool MeasurementUpdate::step(bool first) {
       if (llt_.info() != Eigen::Success) return false;
       weighted = llt_.solve(innovation);
     }
+    left_px_.clear();
+    for (std::size_t i = 0; i < measurements_.size(); ++i)
+      left_px_.push_back(measurements_[i].variance_px2 * weighted.segment<2>(2 * i));
   }
-  delta_.noalias() = X_ * weighted;
+  for (std::size_t i = 0; i < measurements_.size(); ++i)
+    S.diagonal().segment<2>(2 * i).array() += measurements_[i].lasting_px2;
+  lasting_llt_.compute(S);
+  if (lasting_llt_.info() != Eigen::Success) return false;
+  delta_.noalias() = X_ * lasting_llt_.solve(innovation);
+  delta_.head<CameraError::kMotionSize>().noalias() =
+      X_.topRows<CameraError::kMotionSize>() * weighted;
   delta_.segment<CameraError::kCalibrationSize>(CameraError::kReadout) *= calibration_share_;
   if (!delta_.allFinite()) return false;
   camera_ = prior_camera_;
@@ -162,6 +171,13 @@ bool MeasurementUpdate::solve(int iterations) {
   return true;
 }
 
-void MeasurementUpdate::finish() { llt_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(X_); }
+Eigen::MatrixXd MeasurementUpdate::finish() {
+  const auto motion = X_.topRows<CameraError::kMotionSize>();
+  const Eigen::MatrixXd gain = llt_.solve(motion.transpose());  // transposed
+  Eigen::MatrixXd more = gain.transpose() * X_.transpose();
+  lasting_llt_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(X_);
+  more.noalias() -= motion * X_.transpose();
+  return more;
+}
 
 }  // namespace active_matching_slam

@@ -239,18 +239,15 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
 /// Learns from what the matches fused miss of the map as it is now how noisy they are. Where the
 /// state has followed nearly all of a match, what is left tells nothing.
 void Tracker::Implementation::learnNoise(const UpdateReport& report) {
-  const CameraModel lens = camera_.corrected(filter_.camera().lens);
   const Eigen::Vector2d unknown =
       Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<Eigen::Vector2d> residuals_px;
   for (std::size_t i = 0; i < fused_.size(); ++i) {
     const FeatureId id = fused_[i].id;
-    const auto projection = projectFeature(lens, filter_.camera(), *filter_.find(id));
     const double left = report.noise_left[i];
     const double unit = std::sqrt(left) * match_noise_.likeMost(map_.find(id)->noise);
-    residuals_px.push_back(projection && left > kLeastNoiseLeft
-                               ? Eigen::Vector2d((fused_[i].pixel - projection->pixel) / unit)
-                               : unknown);
+    residuals_px.push_back(left > kLeastNoiseLeft ? Eigen::Vector2d(report.left_px[i] / unit)
+                                                  : unknown);
   }
   const double shown_px = match_noise_.learn(residuals_px);
   if (!(shown_px > 0.0)) return;
@@ -289,6 +286,7 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
   for (FeatureMeasurement& match : fused) {
     map_.seeNoise(match.id, match.sigma_px / match_noise_.ofImage());
     match.sigma_px = match_noise_.sigma_px(options_.filter, map_.find(match.id)->noise);
+    match.repetitions = match_noise_.repetitions();
   }
   fused_ = std::move(fused);
 

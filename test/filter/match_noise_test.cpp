@@ -146,23 +146,22 @@ TEST(MatchNoise, TellsWhatAFrameShows) {
   EXPECT_NEAR(noise.learn(gaussian(0.05, 4000, &generator)), 0.05, 0.002);
 }
 
-TEST(MatchNoise, WhatDoesNotShowCountsMoreWhileTheImageHardlyMoves) {
-  const FilterOptions options;
-  std::mt19937 generator(1);
+TEST(MatchNoise, ErrorsLastTheLongerTheLessTheImageMoves) {
   MatchNoise noise;
-  for (int k = 0; k < 100; ++k) noise.learn(gaussian(0.01, 50, &generator));
-  noise.see(std::vector<double>(20, 0.05));
-  const double usual = noise.sigma_px(options);
-  noise.seeMotion(std::vector<double>(20, 20.0));
-  EXPECT_EQ(noise.sigma_px(options), usual);
+  EXPECT_EQ(noise.repetitions(), 1.0);
+  noise.seeMotion(std::vector<double>(20, 200.0));
+  EXPECT_EQ(noise.repetitions(), 1.0);
+  noise.seeMotion(std::vector<double>(20, 5.0));
+  const double moving = noise.repetitions();
+  EXPECT_GT(moving, 2.0);
   noise.seeMotion(std::vector<double>(20, 0.5));
-  const double slow = noise.sigma_px(options);
-  EXPECT_GT(slow, 1.5 * usual);
+  const double slow = noise.repetitions();
+  EXPECT_GT(slow, 5.0 * moving);
   noise.seeMotion(std::vector<double>(20, 0.0));
-  EXPECT_GT(noise.sigma_px(options), slow);
-  EXPECT_LE(noise.sigma_px(options), options.sigma_px);
+  EXPECT_GT(noise.repetitions(), slow);
+  EXPECT_LT(noise.repetitions(), 1000.0);
   noise.seeMotion({0.0, 0.0});  // too few
-  EXPECT_EQ(noise.sigma_px(options), usual);
+  EXPECT_EQ(noise.repetitions(), 1.0);
 }
 
 FeatureNoise learntFeature(double sigma, int matches, double shown_px) {

@@ -26,6 +26,9 @@ struct FeatureMeasurement {
   FeatureId id = -1;
   Eigen::Vector2d pixel;
   double sigma_px = 0.0;  ///< per axis; 0: FilterOptions::sigma_px
+  /// Images that share its error, at least 1: map and calibration, which remember, are told of it
+  /// as of white noise of so many times the variance.
+  double repetitions = 1.0;
 };
 
 struct UpdateReport {
@@ -36,6 +39,8 @@ struct UpdateReport {
   /// Of each measurement given, the share of its variance that it should still show, less the
   /// feature's projection, after the update (per axis): the state follows the rest. 0: not used.
   std::vector<double> noise_left;
+  /// What the state leaves of each measurement, first order [px]; zero: not used.
+  std::vector<Eigen::Vector2d> left_px;
 };
 
 /// Extended Kalman filter over camera and map with full covariance in error-state form. The map's
@@ -93,7 +98,10 @@ class Ekf {
   PredictedMeasurements predictMeasurements(
       const CameraModel& camera, const std::vector<FeatureId>& ids,
       const std::optional<Accelerations>& instead = std::nullopt) const;
-  /// Corrects the state. All measurements are fused at once. Of the calibration's correction only
+  /// Corrects the state. All measurements are fused at once. Errors of matches last for some images
+  /// (FeatureMeasurement::repetitions): the camera's motion, which is anew in each image, is
+  /// corrected by the gain of an image's noise, the rest by that of the noise that lasts, and the
+  /// covariance is that of these gains (Joseph's form). Of the calibration's correction only
   /// FilterOptions::calibration_share is made, and its covariance says so: a partial update (Brink
   /// 2017, Partial-Update Schmidt-Kalman Filter).
   UpdateReport update(const CameraModel& camera,
@@ -127,11 +135,13 @@ class Ekf {
   FeatureState& appendFeature(FeatureKind kind);
   void assignOffsets();
   void limitInverseDepths();
-  /// P <- M (P - X X^T) M^T with M = I + C L^T, the transport of the gauge: C is the change of its
-  /// generators, L its functionals, PL = P L. X: the first `columns` columns of `X`, which has
-  /// kGaugeFreedoms to spare. False when variances had to be repaired.
+  /// P <- M (P - X X^T - D) M^T with M = I + C L^T, the transport of the gauge: C is the change of
+  /// its generators, L its functionals, PL = P L; the motion's rows of D are `more`, the rest is
+  /// zero but for symmetry. X: the first `columns` columns of `X`, which has kGaugeFreedoms to
+  /// spare. False when variances had to be repaired.
   bool correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
-                         const Eigen::MatrixXd& PL, int columns, Eigen::Ref<Eigen::MatrixXd> X);
+                         const Eigen::MatrixXd& PL, const Eigen::MatrixXd& more, int columns,
+                         Eigen::Ref<Eigen::MatrixXd> X);
   bool repairVariances(const Eigen::VectorXd& before);
 
   /// Of the last prediction: unknown velocities of `variance` (linear, angular) moved the camera's

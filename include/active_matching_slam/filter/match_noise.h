@@ -35,26 +35,26 @@ class FeatureNoise {
 
 /// The noise of matches as updates show it: what they leave between matches and map, by its median
 /// (so that the few that are wrong don't count), averaged over half a second or so, and what each
-/// patch is off in its own way, which the map follows, so that nothing is left of it. Both as much
-/// more or less as the present image is blurred or sharp: what is left between it and the templates
-/// tells so at once. It is for the
-/// update only; gates and mutual information keep FilterOptions::sigma_px, which must hold for what
-/// has not been matched yet.
+/// patch is off in its own way, which the state follows, so that nothing is left of it. Both as
+/// much more or less as the present image is blurred or sharp: what is left between it and the
+/// templates tells so at once. It is for the update only; gates and mutual information keep
+/// FilterOptions::sigma_px, which must hold for what has not been matched yet.
 class MatchNoise {
  public:
   /// Nothing is known yet: it is taken to be FilterOptions::sigma_px.
   void reset() { *this = MatchNoise(); }
 
-  /// `residuals_px`: each match fused, less the feature's projection after the update, over the
-  /// root of UpdateReport::noise_left and over likeMost() of its feature; of the image that see()
-  /// was told of. Too few tell nothing.
+  /// `residuals_px`: UpdateReport::left_px of each match fused, over the root of its noise_left and
+  /// over likeMost() of its feature; of the image that see() was told of. Too few tell nothing.
   /// Returns what they show, as a standard deviation per axis [px]; 0: nothing.
   double learn(const std::vector<Eigen::Vector2d>& residuals_px);
 
-  /// How far matches moved since the image before [px]: the less, the longer what a patch is off in
-  /// its own way, by where between pixels it falls and how it is seen, stays the same. Too few tell
-  /// nothing.
+  /// How far matches moved since the image before [px]: the less, the longer what a patch is off by
+  /// where it falls and how it is seen and lit stays the same. Too few tell nothing.
   void seeMotion(std::vector<double> motions_px);
+
+  /// FeatureMeasurement::repetitions of the present image's matches, as seeMotion() had it.
+  double repetitions() const;
 
   /// What the present image tells of its matches (SearchMatch::sigma_px, known ones). Too few tell
   /// nothing: it is like most.
@@ -79,7 +79,7 @@ class MatchNoise {
   double seen_px_ = 0.0;    ///< average of what images tell of most matches; 0: nothing yet
   double of_image_ = 1.0;
   int updates_ = 0;           ///< that told something
-  double repetitions_ = 1.0;  ///< images with the same unseen error
+  double same_images_ = 1.0;  ///< that show the same
 };
 
 }  // namespace active_matching_slam
