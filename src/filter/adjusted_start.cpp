@@ -10,7 +10,7 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kScaleSigma = 1e-3;     ///< of the free unit, relative
+constexpr double kScaleSigma = 3e-4;     ///< of the free unit, relative
 constexpr double kClearlyBetter = 0.35;  ///< of standard deviations
 
 /// Relative standard deviation of the distance from the world's origin, median.

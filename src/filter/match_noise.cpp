@@ -13,14 +13,14 @@ namespace {
 
 constexpr std::size_t kLeastMatches = 8;
 constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once there are many
-/// What a patch is off that updates do not show, in what images tell of it. (By NEES over rendered
-/// runs, as are the next.)
-constexpr double kUnseen = 0.3;
-/// Of the variance of matches, the share that lasts, and the motion of the image after which it is
-/// another.
+/// The noise that matches are taken to have, in what updates show. (By NEES over rendered runs, as
+/// are the next.)
+constexpr double kShareOfShown = 0.9;
+/// Of the variance of matches, the share that lasts, and the motion of the image and the number of
+/// images after which it is another.
 constexpr double kLastingShare = 0.5;
 constexpr double kFreshPx = 50.0;
-constexpr double kMostRepetitions = 300.0;
+constexpr double kMostSameImages = 15.0;
 /// Power of what images tell by which corners wander more. (By the same.)
 constexpr double kWanderByMisfit = 2.0;
 constexpr double kSharpest = 0.2, kMostBlurred = 5.0;  ///< image, in what most tell
@@ -51,8 +51,8 @@ void MatchNoise::seeMotion(std::vector<double> motions_px) {
   const double motion_px = motions_px.size() < kLeastMatches
                                ? std::numeric_limits<double>::infinity()
                                : medianOf(std::move(motions_px));
-  same_images_ = kFreshPx < kMostRepetitions * motion_px ? std::max(1.0, kFreshPx / motion_px)
-                                                         : kMostRepetitions;
+  same_images_ = kFreshPx < kMostSameImages * motion_px ? std::max(1.0, kFreshPx / motion_px)
+                                                        : kMostSameImages;
 }
 
 void MatchNoise::see(std::vector<double> sigmas_px) {
@@ -72,8 +72,7 @@ double MatchNoise::likeMost(const FeatureNoise& feature) const {
 
 double MatchNoise::sigma_px(const FilterOptions& options) const {
   if (updates_ == 0) return options.sigma_px;
-  const double sigma_px =
-      of_image_ * std::sqrt(shown_px2_ + kUnseen * kUnseen * seen_px_ * seen_px_);
+  const double sigma_px = kShareOfShown * of_image_ * std::sqrt(shown_px2_);
   return std::min(options.sigma_px, std::max(options.minimum_sigma_px, sigma_px));
 }
 

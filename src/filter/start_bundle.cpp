@@ -16,7 +16,13 @@ constexpr double kDepthSpread = 3.5;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.12;
 /// What an adjustment takes for the noise of image points, by what they show (by NEES over rendered
 /// runs), and at least.
-constexpr double kShareOfNoise = 0.88, kLeastNoisePx = 0.005;
+constexpr double kShareOfNoise = 0.78, kLeastNoisePx = 0.005;
+/// Images that neighbours are as good as, when they are few: they are off in the same way.
+constexpr double kSameImages = 6.0;
+/// A camera that moves fast blurs, and what points are off by that does not average: from so many
+/// pixels between its last images on the variance grows, over as many more, by so much at most.
+constexpr double kFastPx = 4.0, kMoreWhenFast = 0.8;
+constexpr std::size_t kLastImages = 5;
 /// No image point counts for more than so many times what features miss on the whole (median).
 constexpr double kMostMiss = 3.0;
 /// Points for which an image is taken to be as noisy as most.
@@ -54,6 +60,22 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
         remaining.push_back({place[o.feature], o.pixel, o.d_calibration, o.noise});
     observations.swap(remaining);
   }
+}
+
+/// Median motion of the image [px] from one of the last images to the next.
+double lastMotion(const Bundle& bundle) {
+  const std::size_t images = bundle.observations.size();
+  std::vector<double> motions;
+  for (std::size_t k = images - std::min(kLastImages, images - 1); k < images; ++k) {
+    std::vector<const BundleObservation*> before(bundle.features.size(), nullptr);
+    for (const BundleObservation& o : bundle.observations[k - 1]) before[o.feature] = &o;
+    std::vector<double> of_image;
+    for (const BundleObservation& o : bundle.observations[k])
+      if (before[o.feature] != nullptr)
+        of_image.push_back((o.pixel - before[o.feature]->pixel).norm());
+    if (!of_image.empty()) motions.push_back(medianOf(std::move(of_image)));
+  }
+  return medianOf(std::move(motions));
 }
 
 /// Image points are as noisy, in that of most images, as what those of their image miss shows: of
@@ -101,9 +123,11 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
   // most image points are much better than that.
   options->outlier_px =
       std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
-  // Neighbouring images are off in the same way: noise is higher than it shows while they are few.
   const double images = static_cast<double>(reading->cameras.size());
-  const double shown_px = kShareOfNoise * noise_px * (1.0 + 1.0 / (images - 2.0));
+  const double more =
+      1.0 + kMoreWhenFast * std::clamp(lastMotion(*reading) / kFastPx - 1.0, 0.0, 1.0);
+  const double shown_px =
+      kShareOfNoise * noise_px * (1.0 + kSameImages / (images - 2.0)) * std::sqrt(more);
   options->sigma_px = std::min(options->sigma_px, std::max(shown_px, kLeastNoisePx));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);

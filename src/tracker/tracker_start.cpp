@@ -12,7 +12,7 @@ namespace {
 constexpr double kStartSigmaPosition = 1e-4;  ///< the start defines the world [m]
 constexpr double kStartSigmaRotation = 1e-4;  ///< [rad]
 constexpr double kKnownPointSigma = 5e-4;     ///< how well a known point is known [m]
-constexpr double kScaleSigma = 1e-3;          ///< of the free unit, relative
+constexpr double kScaleSigma = 3e-4;          ///< of the free unit, relative
 
 }  // namespace
 

@@ -43,19 +43,6 @@ TEST(MatchNoise, IsWhatUpdatesLeaveWhateverAFewMatchesSay) {
   EXPECT_NEAR(learntFrom(0.04, 0.1, options), learnt, 0.2 * learnt);
 }
 
-TEST(MatchNoise, HasWhatImagesTellAddedSinceUpdatesDoNotShowIt) {
-  const FilterOptions options;
-  MatchNoise noise;
-  std::mt19937 generator(1);
-  for (int k = 0; k < 200; ++k) noise.learn(gaussian(0.04, 50, &generator));
-  const double shown = noise.sigma_px(options);
-  noise.see(std::vector<double>(7, 0.1));  // too few
-  EXPECT_EQ(noise.sigma_px(options), shown);
-  noise.see({0.01, 0.02, 0.1, 0.1, 0.1, 0.1, 0.1, 5.0, 9.0});
-  EXPECT_GT(noise.sigma_px(options), std::hypot(shown, 0.015));
-  EXPECT_LT(noise.sigma_px(options), std::hypot(shown, 0.12));
-}
-
 TEST(MatchNoise, FollowsTheBlurOfAnImageAtOnceAndForgetsItWithTheNext) {
   const FilterOptions options;
   MatchNoise noise;
@@ -151,15 +138,15 @@ TEST(MatchNoise, ErrorsLastTheLongerTheLessTheImageMoves) {
   EXPECT_EQ(noise.repetitions(), 1.0);
   noise.seeMotion(std::vector<double>(20, 200.0));
   EXPECT_EQ(noise.repetitions(), 1.0);
-  noise.seeMotion(std::vector<double>(20, 5.0));
+  noise.seeMotion(std::vector<double>(20, 20.0));
   const double moving = noise.repetitions();
-  EXPECT_GT(moving, 2.0);
-  noise.seeMotion(std::vector<double>(20, 0.5));
+  EXPECT_GT(moving, 1.5);
+  noise.seeMotion(std::vector<double>(20, 5.0));
   const double slow = noise.repetitions();
-  EXPECT_GT(slow, 5.0 * moving);
-  noise.seeMotion(std::vector<double>(20, 0.0));
+  EXPECT_GT(slow, 2.0 * moving);
+  noise.seeMotion(std::vector<double>(20, 0.0));  // not for ever
   EXPECT_GT(noise.repetitions(), slow);
-  EXPECT_LT(noise.repetitions(), 1000.0);
+  EXPECT_LT(noise.repetitions(), 2.0 * slow);
   noise.seeMotion({0.0, 0.0});  // too few
   EXPECT_EQ(noise.repetitions(), 1.0);
 }
