@@ -10,7 +10,6 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kScaleSigma = 3e-4;     ///< of the free unit, relative
 constexpr double kClearlyBetter = 0.35;  ///< of standard deviations
 
 /// Relative standard deviation of the distance from the world's origin, median.
@@ -56,7 +55,7 @@ std::optional<AdjustedStart> makeAdjustedStart(const CameraModel& model, const E
   BundleOptions doubting_lens = options;
   doubting_lens.sigma_calibration = calibrationSigmas(filter.options());
   const Eigen::MatrixXd joint =
-      bundleCovariance(model, doubting_lens, bundle, last - 1, kScaleSigma);
+      bundleCovariance(model, doubting_lens, bundle, last - 1, Ekf::kFreeScaleSigma);
   if (joint.size() == 0 || !joint.allFinite() || !(dt > 0.0)) return std::nullopt;
 
   AdjustedStart start;

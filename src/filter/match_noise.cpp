@@ -51,8 +51,7 @@ void MatchNoise::seeMotion(std::vector<double> motions_px) {
   const double motion_px = motions_px.size() < kLeastMatches
                                ? std::numeric_limits<double>::infinity()
                                : medianOf(std::move(motions_px));
-  same_images_ = kFreshPx < kMostSameImages * motion_px ? std::max(1.0, kFreshPx / motion_px)
-                                                        : kMostSameImages;
+  same_images_ = std::clamp(kFreshPx / motion_px, 1.0, kMostSameImages);
 }
 
 void MatchNoise::see(std::vector<double> sigmas_px) {

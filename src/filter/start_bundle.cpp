@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "active_matching_slam/filter/match_motion.h"
 #include "active_matching_slam/filter/quantile.h"
 #include "start_readings.h"
 
@@ -64,18 +65,19 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
 
 /// Median motion of the image [px] from one of the last images to the next.
 double lastMotion(const Bundle& bundle) {
+  const auto matches = [&bundle](std::size_t image) {
+    std::vector<FeatureMeasurement> matches;
+    for (const BundleObservation& o : bundle.observations[image])
+      matches.push_back({o.feature, o.pixel, 0.0});
+    return matches;
+  };
   const std::size_t images = bundle.observations.size();
-  std::vector<double> motions;
+  std::vector<double> motions_px;
   for (std::size_t k = images - std::min(kLastImages, images - 1); k < images; ++k) {
-    std::vector<const BundleObservation*> before(bundle.features.size(), nullptr);
-    for (const BundleObservation& o : bundle.observations[k - 1]) before[o.feature] = &o;
-    std::vector<double> of_image;
-    for (const BundleObservation& o : bundle.observations[k])
-      if (before[o.feature] != nullptr)
-        of_image.push_back((o.pixel - before[o.feature]->pixel).norm());
-    if (!of_image.empty()) motions.push_back(medianOf(std::move(of_image)));
+    std::vector<double> of_image_px = matchMotions(matches(k - 1), matches(k));
+    if (!of_image_px.empty()) motions_px.push_back(medianOf(std::move(of_image_px)));
   }
-  return medianOf(std::move(motions));
+  return medianOf(std::move(motions_px));
 }
 
 /// Image points are as noisy, in that of most images, as what those of their image miss shows: of
@@ -124,10 +126,10 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
   options->outlier_px =
       std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
   const double images = static_cast<double>(reading->cameras.size());
-  const double more =
+  const double variance_by_blur =
       1.0 + kMoreWhenFast * std::clamp(lastMotion(*reading) / kFastPx - 1.0, 0.0, 1.0);
   const double shown_px =
-      kShareOfNoise * noise_px * (1.0 + kSameImages / (images - 2.0)) * std::sqrt(more);
+      kShareOfNoise * noise_px * (1.0 + kSameImages / (images - 2.0)) * std::sqrt(variance_by_blur);
   options->sigma_px = std::min(options->sigma_px, std::max(shown_px, kLeastNoisePx));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);

@@ -12,7 +12,6 @@ namespace {
 constexpr double kStartSigmaPosition = 1e-4;  ///< the start defines the world [m]
 constexpr double kStartSigmaRotation = 1e-4;  ///< [rad]
 constexpr double kKnownPointSigma = 5e-4;     ///< how well a known point is known [m]
-constexpr double kScaleSigma = 3e-4;          ///< of the free unit, relative
 
 }  // namespace
 
@@ -41,7 +40,7 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
     started = startFeatures(image, options_.map.features_per_frame - map_.size(), frame);
   start_adjustment_.end();
   if (options_.known_points.empty()) {
-    filter_.fixScale(kScaleSigma);
+    filter_.fixScale(Ekf::kFreeScaleSigma);
     std::vector<FeatureMeasurement> first;
     for (const FeatureState& feature : filter_.features())
       if (const auto projection = projectFeature(camera_, filter_.camera(), feature))

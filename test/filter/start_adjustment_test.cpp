@@ -111,8 +111,7 @@ double medianInverseDepth(const AdjustedStart& adjusted) {
   std::vector<double> inverse_depths;
   for (const FeatureState& feature : adjusted.features)
     inverse_depths.push_back(feature.inverse_depth);
-  std::sort(inverse_depths.begin(), inverse_depths.end());
-  return inverse_depths[inverse_depths.size() / 2];
+  return medianOf(std::move(inverse_depths));
 }
 
 /// Length of the adjusted way by that of the true one.
@@ -272,8 +271,7 @@ double depthSigma(const AdjustedStart& adjusted) {
     const int row = feature.offset + FeatureError::kInverseDepth;
     sigmas.push_back(std::sqrt(adjusted.covariance(row, row)) / feature.inverse_depth);
   }
-  std::sort(sigmas.begin(), sigmas.end());
-  return sigmas[sigmas.size() / 2];
+  return medianOf(std::move(sigmas));
 }
 
 TEST(StartAdjustment, ACameraThatWasFastIsBelievedLess) {

@@ -111,6 +111,8 @@ class Ekf {
   /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this
   /// only chooses the gauge, and keeps what follows from changing the unit.
   void fixScale(double relative_sigma);
+  /// How well a start is taken to know the unit that it chooses.
+  static constexpr double kFreeScaleSigma = 3e-4;
 
   /// Multiplies all lengths (map, position, velocity and their covariances) by `factor` > 0.
   void rescale(double factor);

@@ -34,10 +34,9 @@ class FeatureNoise {
 };
 
 /// The noise of matches as updates show it: what they leave between matches and map, by its median
-/// (so that the few that are wrong don't count), averaged over half a second or so, and what each
-/// patch is off in its own way, which the state follows, so that nothing is left of it. Both as
-/// much more or less as the present image is blurred or sharp: what is left between it and the
-/// templates tells so at once. It is for the update only; gates and mutual information keep
+/// (so that the few that are wrong don't count), averaged over half a second or so, and as much more
+/// or less as the present image is blurred or sharp: what is left between it and the templates
+/// tells so at once. It is for the update only; gates and mutual information keep
 /// FilterOptions::sigma_px, which must hold for what has not been matched yet.
 class MatchNoise {
  public:
