@@ -13,7 +13,6 @@ namespace active_matching_slam {
 namespace {
 
 constexpr double kCostOfInvisible = 1e3;  ///< of an image point whose feature does not project
-constexpr double kLeastGain = 1e-4;       ///< relative fall of the cost that is worth a step more
 /// Of every bearing [1/rad^2]: one that no image shows stays as it is.
 constexpr double kLeastInformation = 1e-2;
 
@@ -116,6 +115,8 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
     N.feature_gradient[3 * i + 2] += weight * error;
   }
   CalibrationMatrix calibration = CalibrationMatrix::Zero();
+  Eigen::Matrix<double, kCalibrationSize, Eigen::Dynamic> calibration_features;
+  calibration_features.setZero(kCalibrationSize, 3 * F);
   for (int k = 0; k <= K; ++k) {
     const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
     Matrix6 pose = Matrix6::Zero();
@@ -140,7 +141,7 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
       const Eigen::Matrix<double, 2, kCalibrationSize> weighted_D = weight * D;
       calibration.noalias() += D.transpose() * weighted_D;
       N.camera_gradient.tail<kCalibrationSize>() += weighted_D.transpose() * residual;
-      N.cross.block<kCalibrationSize, 3>(6 * K, 3 * o.feature) += D.transpose() * weighted_J;
+      calibration_features.middleCols<3>(3 * o.feature).noalias() += D.transpose() * weighted_J;
       if (k == 0) continue;
       const Matrix26 weighted_pose = weight * d_pose;
       pose.noalias() += d_pose.transpose() * weighted_pose;
@@ -155,6 +156,7 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
     N.camera_gradient.segment<6>(row) = pose_gradient;
   }
   N.cameras.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += calibration;
+  N.cross.bottomRows<kCalibrationSize>() = calibration_features;
   return N;
 }
 
@@ -300,22 +302,28 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
   double cost = N.cost;
   Eigen::VectorXd camera_step, feature_steps;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
-    Bundle trial;
+    const std::vector<CameraState> cameras = bundle->cameras;
+    const std::vector<FeatureState> features = bundle->features;
+    const CalibrationVector calibration = bundle->calibration;
     double gain = 0.0;
     while (!(gain > 0.0) && damping < 1e8) {
       if (solveStep(N, damping, &camera_step, &feature_steps)) {
-        trial = *bundle;
-        applyStep(options, camera_step, feature_steps, &trial);
-        gain = cost - bundleCost(model, options, trial);
+        applyStep(options, camera_step, feature_steps, bundle);
+        gain = cost - bundleCost(model, options, *bundle);
+        if (!(gain > 0.0)) {
+          bundle->cameras = cameras;
+          bundle->features = features;
+          bundle->calibration = calibration;
+        }
       }
       damping = gain > 0.0 ? std::max(0.1 * damping, 1e-9) : 10.0 * damping;
     }
     if (!(gain > 0.0)) break;
-    *bundle = std::move(trial);
     gain += chooseUnit(options, bundle);
     cost -= gain;
     const int left = options.max_iterations - 1 - iteration;
-    if (left == 0 || gain < kLeastGain * cost || cost - left * gain > options.hopeless_cost) break;
+    if (left == 0 || gain < options.least_gain * cost || cost - left * gain > options.hopeless_cost)
+      break;
     N = linearise(model, options, *bundle);
   }
   return cost;

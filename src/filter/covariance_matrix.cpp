@@ -21,6 +21,14 @@ void CovarianceMatrix::reset(int size) {
   view().setZero();
 }
 
+void CovarianceMatrix::assign(const Eigen::MatrixXd& covariance) {
+  size_ = 0;
+  reserve(static_cast<int>(covariance.rows()));
+  size_ = static_cast<int>(covariance.rows());
+  view() = covariance;
+  mirrorLower();
+}
+
 void CovarianceMatrix::extend(int count) {
   const int old_size = size_;
   reserve(old_size + count);

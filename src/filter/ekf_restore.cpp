@@ -12,7 +12,6 @@ constexpr double kUnitTolerance = 1e-6;  ///< of lengths and angles that must be
 /// Correlations may exceed one by rounding only, which for all but certain rows is measured by the
 /// larger variance.
 constexpr double kCorrelationTolerance = 1e-3, kRounding = 1e-9;
-constexpr int kRowsAtOnce = 32;  ///< of a matrix, so that its columns and rows stay in the cache
 
 [[noreturn]] void refuse(const std::string& what) {
   throw std::invalid_argument("filter state: " + what);
@@ -52,22 +51,25 @@ void checkCovariance(const Eigen::MatrixXd& P, int size) {
   if (P.rows() != size || P.cols() != size)
     refuse("covariance of " + std::to_string(P.rows()) + " x " + std::to_string(P.cols()) +
            ", the state has " + std::to_string(size));
-  if (!P.allFinite()) refuse("the covariance is not finite");
+  if (!std::isfinite((0.0 * P).sum())) refuse("the covariance is not finite");
   const Eigen::VectorXd variance = P.diagonal();
   if (!(variance.minCoeff() >= 0.0)) refuse("the covariance has a negative variance");
   // Bounds by standard deviations: products of large variances would overflow.
   const Eigen::VectorXd sigma = variance.cwiseSqrt();
-  for (int begin = 0; begin < size; begin += kRowsAtOnce) {
-    const int end = std::min(begin + kRowsAtOnce, size);
-    for (int j = 0; j < end; ++j) {
-      for (int i = std::max(begin, j + 1); i < end; ++i) {
-        const double bound = sigma[i] * sigma[j];
-        const double slack =
-            kCorrelationTolerance * bound + kRounding * (variance[i] + variance[j]);
-        if (std::abs(P(i, j) - P(j, i)) > slack) refuse("the covariance is not symmetric");
-        if (std::abs(P(i, j)) > bound + slack)
-          refuse("the covariance holds a correlation beyond 1");
-      }
+  constexpr int kTile = 32;  // its columns and rows stay in the cache
+  using Column = Eigen::Array<double, Eigen::Dynamic, 1, 0, kTile, 1>;
+  for (int begin = 0; begin < size; begin += kTile) {
+    const int rows = std::min(kTile, size - begin);
+    for (int j = 0; j < begin + rows; ++j) {
+      const Column below = P.col(j).segment(begin, rows).array();
+      const Column beside = P.row(j).segment(begin, rows).transpose().array();
+      const Column bound = sigma.segment(begin, rows).array() * sigma[j];
+      const Column slack = kCorrelationTolerance * bound +
+                           kRounding * (variance.segment(begin, rows).array() + variance[j]);
+      if (((below - beside).abs() - slack).maxCoeff() > 0.0)
+        refuse("the covariance is not symmetric");
+      if ((below.abs() - bound - slack).maxCoeff() > 0.0)
+        refuse("the covariance holds a correlation beyond 1");
     }
   }
 }
@@ -96,9 +98,7 @@ void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& fe
   features_ = features;
   assignOffsets();
   impulse_.reset();
-  covariance_.reset(size);
-  covariance_.view() = covariance;
-  covariance_.mirrorLower();
+  covariance_.assign(covariance);
   next_id_ = next_id;
 }
 

@@ -24,6 +24,9 @@ constexpr std::size_t kMostImages = 40;     ///< kept
 constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
+constexpr std::size_t kManyImages = 20;  ///< beyond which an adjustment takes an image more
+constexpr double kRoughGain = 1e-2;      ///< of an adjustment that another one follows
+constexpr int kStepsForOneMore = 2;      ///< once all but the last image are adjusted
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
@@ -256,6 +259,8 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
   return bundle;
 }
 
+/// A step an image, so that none takes long: which reading, what of it; with many images, what
+/// noise in between.
 std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, const Ekf& filter) {
   if (!is_active_ || images_.size() < 4) return std::nullopt;
   if (!chosen_) {
@@ -264,12 +269,16 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
     if (!parallax_px || !isTime(*parallax_px, filter.options().sigma_px)) return std::nullopt;
     chosen_ = chooseReading(model, filter, *parallax_px);
     if (!chosen_ && *parallax_px >= kLastParallaxPx) end();
-    // Later, with more images, the rest waits for the next one, so that no frame takes long.
-    if (!chosen_ || *parallax_px > kEveryImageUpToPx) return std::nullopt;
+    return std::nullopt;
   }
   const Reading chosen = *std::exchange(chosen_, std::nullopt);
+  auto weighed = weigh(model, filter, chosen);
+  if (weighed && !chosen.is_weighed && images_.size() > kManyImages) {
+    chosen_ = std::move(weighed->reading);
+    return std::nullopt;
+  }
   if (chosen.parallax_px >= kLastParallaxPx) end();
-  return adjustTo(model, filter, chosen);
+  return weighed ? adopt(model, filter, &*weighed) : std::nullopt;
 }
 
 /// What the filter believes and its opposites are told apart. Empty when none is clearly the best.
@@ -323,44 +332,63 @@ Bundle StartAdjustment::continued(const Reading& chosen, const Bundle& believed,
   return all;
 }
 
-std::optional<AdjustedStart> StartAdjustment::adjustTo(const CameraModel& model, const Ekf& filter,
-                                                       const Reading& chosen) {
-  std::vector<FeatureId> ids;
-  Bundle believed = makeBundle(model, &ids);
-  if (!isConnected(believed)) return std::nullopt;
-  Bundle reading = believed;
-  chooseUnit(startOptions(filter.options()), &reading);  // that of `chosen`
-  reading = continued(chosen, reading, ids);
-  BundleOptions options = withDepthsOf(reading, startOptions(filter.options()));
-  if (!chosen.is_adjusted) adjustBundle(model, options, &reading);
-  adjustByItsNoise(model, &options, &reading, &believed, &ids);
+/// All images kept, as `chosen` reads them, adjusted by the noise that they show.
+std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel& model,
+                                                               const Ekf& filter,
+                                                               const Reading& chosen) const {
+  Weighed all;
+  Reading& reading = all.reading;
+  reading.parallax_px = chosen.parallax_px;
+  reading.lead = chosen.lead;
+  reading.is_adjusted = reading.is_weighed = true;
+  for (const Image& image : images_) reading.images.push_back(image.index);
+  all.believed = makeBundle(model, &reading.ids);
+  if (!isConnected(all.believed)) return std::nullopt;
+  reading.bundle = all.believed;
+  chooseUnit(startOptions(filter.options()), &reading.bundle);  // that of `chosen`
+  reading.bundle = continued(chosen, reading.bundle, reading.ids);
+  all.options = withDepthsOf(reading.bundle, startOptions(filter.options()));
+  if (!chosen.is_adjusted) {
+    BundleOptions roughly = all.options;
+    roughly.least_gain = kRoughGain;
+    adjustBundle(model, roughly, &reading.bundle);
+  }
+  if (chosen.is_weighed) all.options.max_iterations = kStepsForOneMore;
+  adjustByItsNoise(model, &all.options, &reading.bundle, &all.believed, &reading.ids);
+  return all;
+}
+
+/// The filter's state by what was weighed, unless the filter knows more.
+std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, const Ekf& filter,
+                                                    Weighed* weighed) {
+  Reading& reading = weighed->reading;
   // Others have seen the map: its unit of length stays.
-  rescaleBundle(depthFactor(believed, reading), &reading);
-  auto start = makeAdjustedStart(model, filter, options, reading, ids, images_.back().interval_s);
+  rescaleBundle(depthFactor(weighed->believed, reading.bundle), &reading.bundle);
+  auto start = makeAdjustedStart(model, filter, weighed->options, reading.bundle, reading.ids,
+                                 images_.back().interval_s);
   if (!start) return std::nullopt;
-  if (chosen.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
+  if (reading.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();
     return std::nullopt;
   }
   start->is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
-  adopt(reading, ids, &*start);
-  is_settled_ |= chosen.lead > kSettlingLead && chosen.parallax_px > kSettlingParallaxPx;
-  last_parallax_px_ = chosen.parallax_px;
+  move(reading, &*start);
+  is_settled_ |= reading.lead > kSettlingLead && reading.parallax_px > kSettlingParallaxPx;
+  last_parallax_px_ = reading.parallax_px;
   return start;
 }
 
 /// Cameras and features are from now on where `reading` has them; `start` hears of the moves.
-void StartAdjustment::adopt(const Bundle& reading, const std::vector<FeatureId>& ids,
-                            AdjustedStart* start) {
+void StartAdjustment::move(const Reading& reading, AdjustedStart* start) {
   for (std::size_t k = 0; k < images_.size(); ++k) {
     start->moves.push_back({images_[k].index, images_[k].camera.poseWorldCamera(),
-                            reading.cameras[k].poseWorldCamera()});
-    images_[k].camera = reading.cameras[k];
+                            reading.bundle.cameras[k].poseWorldCamera()});
+    images_[k].camera = reading.bundle.cameras[k];
   }
   auto feature = features_.begin();
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    while (feature->id != ids[i]) ++feature;  // both ascend
-    *feature = reading.features[i];
+  for (std::size_t i = 0; i < reading.ids.size(); ++i) {
+    while (feature->id != reading.ids[i]) ++feature;  // both ascend
+    *feature = reading.bundle.features[i];
   }
 }
 

@@ -18,6 +18,8 @@ namespace {
 constexpr double kDepthFreedom = 10.0;
 constexpr std::size_t kFewImages = 10;     ///< that tell the readings of the images apart
 constexpr double kHopelessCostGap = 12.0;  ///< by the noise assumed
+/// Relative fall of the cost that is worth a step more, by that noise and by the images' own.
+constexpr double kGainToCompare = 1e-2, kGainToTell = 1e-3;
 constexpr double kLeastCostGap = 6.0;      ///< by the images' own: to the next reading, odds of e^3
 constexpr double kMostCostPerPoint = 4.0;  ///< of 2 expected: beyond, things move or matches lie
 constexpr double kLeastNoise_px = 0.04;    ///< by which matches are told from wrong ones
@@ -116,6 +118,7 @@ std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleO
   std::vector<double> costs;
   BundleOptions telling = options;
   telling.sigma_inverse_depth *= kDepthFreedom;
+  telling.least_gain = kGainToCompare;
   for (std::size_t i = 0; i < 2 * upright; ++i) {
     if (i >= upright) {
       if (i == 3 && isSameReading(readings[0], readings[1])) break;
@@ -134,6 +137,7 @@ std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleO
   const double credited = kLeastNoiseShare * std::pow(options.sigma_px / telling.sigma_px, 2);
   const double least_gap = kLeastCostGap * std::max(1.0, credited);
   telling.hopeless_cost = std::numeric_limits<double>::infinity();
+  telling.least_gain = kGainToTell;
   for (std::size_t i = 0; i < costs.size(); ++i) {
     costs[i] = adjustBundle(model, telling, &readings[i]);
     telling.hopeless_cost = std::min(telling.hopeless_cost, costs[i] + least_gap);

@@ -166,7 +166,7 @@ TEST_P(FreeScale, TrackAndCovarianceHoldFromTheFirstImageOn) {
             << static_cast<double>(within) / frames << ", worst error " << 100.0 * worst
             << " % of the path\n";
   // A start takes less noise than its points show, as suits images; here it is white.
-  EXPECT_GE(static_cast<double>(within), 0.85 * frames);
+  EXPECT_GE(static_cast<double>(within), 0.8 * frames);
 }
 
 INSTANTIATE_TEST_SUITE_P(SlowAndJerky, FreeScale, testing::Values(0.5, 2.0));

@@ -78,11 +78,14 @@ class StartOfATrack {
     adjustment_.addFirstSights(first_sights);
   }
 
-  /// With much parallax, what has been chosen at one image is adjusted at the next.
+  /// An adjustment takes as many as three steps, one a call.
   std::optional<AdjustedStart> adjust() {
-    const auto adjusted = adjustment_.adjust(model_, filter_);
-    return adjusted ? adjusted : adjustment_.adjust(model_, filter_);
+    std::optional<AdjustedStart> adjusted;
+    for (int step = 0; step < 3 && !adjusted; ++step) adjusted = adjustOnce();
+    return adjusted;
   }
+
+  std::optional<AdjustedStart> adjustOnce() { return adjustment_.adjust(model_, filter_); }
 
   static FilterOptions options() {
     FilterOptions options;
@@ -370,6 +373,36 @@ TEST(StartAdjustment, TheUnitOfTheDepthsStays) {
     ratios.push_back(feature.inverse_depth / start.filter().find(feature.id)->inverse_depth);
   EXPECT_NEAR(medianOf(std::move(ratios)), 1.0, 1e-3);
   EXPECT_GT(cosineBetween(second->camera.position_world, truth.cameras[23].position_world), 0.99);
+}
+
+TEST(StartAdjustment, GoesInStepsAndTakesInTheImageOfTheLast) {
+  for (const auto& [images, steps] : {std::pair{12, 2}, std::pair{32, 3}}) {
+    const Bundle truth = track(images, 0.003, 9);
+    StartOfATrack start(truth);
+    start.show(images - steps);
+    for (int step = 1; step < steps; ++step) {
+      EXPECT_FALSE(start.adjustOnce()) << images << " images, step " << step;
+      start.filter().predict(1.0 / 30.0);
+      start.show(images - steps + step);
+    }
+    const auto adjusted = start.adjustOnce();
+    ASSERT_TRUE(adjusted) << images;
+    EXPECT_EQ(adjusted->moves.back().image, images - 1);
+    EXPECT_GT(
+        cosineBetween(adjusted->camera.position_world, truth.cameras[images - 1].position_world),
+        0.99);
+    StartOfATrack at_once(truth);
+    const auto same = at_once.adjustAfter(images - 1);
+    ASSERT_TRUE(same) << images;
+    // The unit of length is told by the depths.
+    double sum = 0.0, sum_at_once = 0.0;
+    for (const FeatureState& feature : adjusted->features) sum += feature.inverse_depth;
+    for (const FeatureState& feature : same->features) sum_at_once += feature.inverse_depth;
+    EXPECT_EQ(adjusted->features.size(), same->features.size());
+    const Eigen::Vector3d moved = adjusted->camera.position_world * sum;
+    const Eigen::Vector3d moved_at_once = same->camera.position_world * sum_at_once;
+    EXPECT_LT((moved - moved_at_once).norm(), 0.02 * moved.norm()) << images;
+  }
 }
 
 TEST(StartAdjustment, ASettledReadingIsAdjustedFurtherFromWhatTheFilterBelieves) {

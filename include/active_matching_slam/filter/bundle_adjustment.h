@@ -37,6 +37,7 @@ struct BundleOptions {
   double minimum_inverse_depth = 1e-4;
   CalibrationVector sigma_calibration = CalibrationVector::Zero();  ///< prior, about zero
   int max_iterations = 20;
+  double least_gain = 1e-4;  ///< relative fall of the cost that is worth a step more
   /// Ends where steps like the last, as many as are left, would not bring the cost below.
   double hopeless_cost = std::numeric_limits<double>::infinity();
 };

@@ -19,6 +19,8 @@ class CovarianceMatrix {
 
   /// size x size zeros.
   void reset(int size);
+  /// The lower triangle of a square matrix.
+  void assign(const Eigen::MatrixXd& covariance);
   /// Appends `count` rows and columns of zeros.
   void extend(int count);
   /// Keeps these ranges of rows and columns (begin, count), ascending and disjoint; the rest goes.

@@ -57,8 +57,9 @@ class StartAdjustment {
   /// Takes all lengths so far times `factor`, as the filter does when its scale becomes known.
   void rescale(double factor);
 
-  /// The adjusted state when it is time for one, or was at the image before, and the images leave
-  /// no doubt. `model` as calibrated; the readout is adjusted too.
+  /// The adjusted state when it was time for one an image or two ago and the images leave no
+  /// doubt: the work is done in steps, one a call. `model` as calibrated; the readout is adjusted
+  /// too.
   std::optional<AdjustedStart> adjust(const CameraModel& model, const Ekf& filter);
 
  private:
@@ -80,6 +81,12 @@ class StartAdjustment {
     double lead = 0.0;                 ///< see ChosenReading; zero: its opposites were not asked
     std::vector<std::int64_t> images;  ///< of its cameras
     bool is_adjusted = false;          ///< all of its images
+    bool is_weighed = false;           ///< and by the noise that they show
+  };
+  struct Weighed {
+    Reading reading;
+    Bundle believed;  ///< the same features and images as the filter has them
+    BundleOptions options;
   };
 
   void thinOut();
@@ -92,15 +99,16 @@ class StartAdjustment {
                                        double parallax_px) const;
   Bundle continued(const Reading& chosen, const Bundle& believed,
                    const std::vector<FeatureId>& ids) const;
-  std::optional<AdjustedStart> adjustTo(const CameraModel& model, const Ekf& filter,
-                                        const Reading& chosen);
-  void adopt(const Bundle& reading, const std::vector<FeatureId>& ids, AdjustedStart* start);
+  std::optional<Weighed> weigh(const CameraModel& model, const Ekf& filter,
+                               const Reading& chosen) const;
+  std::optional<AdjustedStart> adopt(const CameraModel& model, const Ekf& filter, Weighed* weighed);
+  void move(const Reading& reading, AdjustedStart* start);
 
   bool is_active_ = false;
   std::vector<Image> images_;  ///< the first, some between, the last two
   /// Ascending id: those of the filter, and what has left it but is in the images.
   std::vector<FeatureState> features_;
-  std::optional<Reading> chosen_;  ///< in the image before, to be adjusted now
+  std::optional<Reading> chosen_;  ///< at the image before, for the next step
   bool has_left_first_ = false;    ///< the last image shares too little with the first
   bool is_settled_ = false;        ///< what the filter was given has no opposite any more
   double least_motion_px_ = 1.0;
