@@ -14,17 +14,19 @@ void CovarianceMatrix::reserve(int size) {
   storage_.swap(grown);
 }
 
-void CovarianceMatrix::reset(int size) {
+void CovarianceMatrix::resize(int size) {
   size_ = 0;
   reserve(size);
   size_ = size;
+}
+
+void CovarianceMatrix::reset(int size) {
+  resize(size);
   view().setZero();
 }
 
 void CovarianceMatrix::assign(const Eigen::MatrixXd& covariance) {
-  size_ = 0;
-  reserve(static_cast<int>(covariance.rows()));
-  size_ = static_cast<int>(covariance.rows());
+  resize(static_cast<int>(covariance.rows()));
   view() = covariance;
   mirrorLower();
 }

@@ -51,6 +51,7 @@ void checkCovariance(const Eigen::MatrixXd& P, int size) {
   if (P.rows() != size || P.cols() != size)
     refuse("covariance of " + std::to_string(P.rows()) + " x " + std::to_string(P.cols()) +
            ", the state has " + std::to_string(size));
+  // In one pass over the whole; allFinite() goes element by element.
   if (!std::isfinite((0.0 * P).sum())) refuse("the covariance is not finite");
   const Eigen::VectorXd variance = P.diagonal();
   if (!(variance.minCoeff() >= 0.0)) refuse("the covariance has a negative variance");

@@ -273,12 +273,12 @@ std::optional<AdjustedStart> StartAdjustment::adjust(const CameraModel& model, c
   }
   const Reading chosen = *std::exchange(chosen_, std::nullopt);
   auto weighed = weigh(model, filter, chosen);
-  if (weighed && !chosen.is_weighed && images_.size() > kManyImages) {
+  if (weighed && chosen.adjusted != Adjusted::kAllByTheirNoise && images_.size() > kManyImages) {
     chosen_ = std::move(weighed->reading);
     return std::nullopt;
   }
   if (chosen.parallax_px >= kLastParallaxPx) end();
-  return weighed ? adopt(model, filter, &*weighed) : std::nullopt;
+  return weighed ? adopt(model, filter, *std::move(weighed)) : std::nullopt;
 }
 
 /// What the filter believes and its opposites are told apart. Empty when none is clearly the best.
@@ -297,7 +297,7 @@ std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const Cam
   if (is_settled_) {
     const double cost = adjustBundle(model, withDepthsOf(chosen.bundle, options), &chosen.bundle);
     if (costsTooMuch(cost, chosen.bundle)) return std::nullopt;
-    chosen.is_adjusted = true;
+    chosen.adjusted = Adjusted::kAllImages;
     return chosen;
   }
   auto best = bestReading(model, options, chosen.bundle, last_parallax_px_ == 0.0);
@@ -340,7 +340,7 @@ std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel
   Reading& reading = all.reading;
   reading.parallax_px = chosen.parallax_px;
   reading.lead = chosen.lead;
-  reading.is_adjusted = reading.is_weighed = true;
+  reading.adjusted = Adjusted::kAllByTheirNoise;
   for (const Image& image : images_) reading.images.push_back(image.index);
   all.believed = makeBundle(model, &reading.ids);
   if (!isConnected(all.believed)) return std::nullopt;
@@ -348,23 +348,23 @@ std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel
   chooseUnit(startOptions(filter.options()), &reading.bundle);  // that of `chosen`
   reading.bundle = continued(chosen, reading.bundle, reading.ids);
   all.options = withDepthsOf(reading.bundle, startOptions(filter.options()));
-  if (!chosen.is_adjusted) {
+  if (chosen.adjusted == Adjusted::kSomeImages) {
     BundleOptions roughly = all.options;
     roughly.least_gain = kRoughGain;
     adjustBundle(model, roughly, &reading.bundle);
   }
-  if (chosen.is_weighed) all.options.max_iterations = kStepsForOneMore;
+  if (chosen.adjusted == Adjusted::kAllByTheirNoise) all.options.max_iterations = kStepsForOneMore;
   adjustByItsNoise(model, &all.options, &reading.bundle, &all.believed, &reading.ids);
   return all;
 }
 
 /// The filter's state by what was weighed, unless the filter knows more.
 std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, const Ekf& filter,
-                                                    Weighed* weighed) {
-  Reading& reading = weighed->reading;
+                                                    Weighed weighed) {
+  Reading& reading = weighed.reading;
   // Others have seen the map: its unit of length stays.
-  rescaleBundle(depthFactor(weighed->believed, reading.bundle), &reading.bundle);
-  auto start = makeAdjustedStart(model, filter, weighed->options, reading.bundle, reading.ids,
+  rescaleBundle(depthFactor(weighed.believed, reading.bundle), &reading.bundle);
+  auto start = makeAdjustedStart(model, filter, weighed.options, reading.bundle, reading.ids,
                                  images_.back().interval_s);
   if (!start) return std::nullopt;
   if (reading.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
@@ -372,14 +372,14 @@ std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, co
     return std::nullopt;
   }
   start->is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
-  move(reading, &*start);
+  takeOver(reading, &*start);
   is_settled_ |= reading.lead > kSettlingLead && reading.parallax_px > kSettlingParallaxPx;
   last_parallax_px_ = reading.parallax_px;
   return start;
 }
 
 /// Cameras and features are from now on where `reading` has them; `start` hears of the moves.
-void StartAdjustment::move(const Reading& reading, AdjustedStart* start) {
+void StartAdjustment::takeOver(const Reading& reading, AdjustedStart* start) {
   for (std::size_t k = 0; k < images_.size(); ++k) {
     start->moves.push_back({images_[k].index, images_[k].camera.poseWorldCamera(),
                             reading.bundle.cameras[k].poseWorldCamera()});

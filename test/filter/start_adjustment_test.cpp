@@ -394,13 +394,10 @@ TEST(StartAdjustment, GoesInStepsAndTakesInTheImageOfTheLast) {
     StartOfATrack at_once(truth);
     const auto same = at_once.adjustAfter(images - 1);
     ASSERT_TRUE(same) << images;
-    // The unit of length is told by the depths.
-    double sum = 0.0, sum_at_once = 0.0;
-    for (const FeatureState& feature : adjusted->features) sum += feature.inverse_depth;
-    for (const FeatureState& feature : same->features) sum_at_once += feature.inverse_depth;
     EXPECT_EQ(adjusted->features.size(), same->features.size());
-    const Eigen::Vector3d moved = adjusted->camera.position_world * sum;
-    const Eigen::Vector3d moved_at_once = same->camera.position_world * sum_at_once;
+    // The unit of length is told by the depths.
+    const Eigen::Vector3d moved = adjusted->camera.position_world * medianInverseDepth(*adjusted);
+    const Eigen::Vector3d moved_at_once = same->camera.position_world * medianInverseDepth(*same);
     EXPECT_LT((moved - moved_at_once).norm(), 0.02 * moved.norm()) << images;
   }
 }

@@ -30,6 +30,8 @@ class CovarianceMatrix {
 
  private:
   void reserve(int size);
+  /// Of what was there nothing is kept.
+  void resize(int size);
 
   Eigen::MatrixXd storage_;
   int size_ = 0;

@@ -34,8 +34,8 @@ class FeatureNoise {
 };
 
 /// The noise of matches as updates show it: what they leave between matches and map, by its median
-/// (so that the few that are wrong don't count), averaged over half a second or so, and as much more
-/// or less as the present image is blurred or sharp: what is left between it and the templates
+/// (so that the few that are wrong don't count), averaged over half a second or so, and as much
+/// more or less as the present image is blurred or sharp: what is left between it and the templates
 /// tells so at once. It is for the update only; gates and mutual information keep
 /// FilterOptions::sigma_px, which must hold for what has not been matched yet.
 class MatchNoise {

@@ -73,6 +73,8 @@ class StartAdjustment {
     double sigma_px = 0.0;  ///< of most of them; 0: unknown
   };
 
+  enum class Adjusted { kSomeImages, kAllImages, kAllByTheirNoise };
+
   /// One of the explanations of the images kept.
   struct Reading {
     Bundle bundle;
@@ -80,8 +82,7 @@ class StartAdjustment {
     double parallax_px = 0.0;
     double lead = 0.0;                 ///< see ChosenReading; zero: its opposites were not asked
     std::vector<std::int64_t> images;  ///< of its cameras
-    bool is_adjusted = false;          ///< all of its images
-    bool is_weighed = false;           ///< and by the noise that they show
+    Adjusted adjusted = Adjusted::kSomeImages;
   };
   struct Weighed {
     Reading reading;
@@ -101,8 +102,8 @@ class StartAdjustment {
                    const std::vector<FeatureId>& ids) const;
   std::optional<Weighed> weigh(const CameraModel& model, const Ekf& filter,
                                const Reading& chosen) const;
-  std::optional<AdjustedStart> adopt(const CameraModel& model, const Ekf& filter, Weighed* weighed);
-  void move(const Reading& reading, AdjustedStart* start);
+  std::optional<AdjustedStart> adopt(const CameraModel& model, const Ekf& filter, Weighed weighed);
+  void takeOver(const Reading& reading, AdjustedStart* start);
 
   bool is_active_ = false;
   std::vector<Image> images_;  ///< the first, some between, the last two
