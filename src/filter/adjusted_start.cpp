@@ -28,7 +28,7 @@ double depthSigma(const Ekf& filter, const std::vector<FeatureState>& features) 
 double depthSigma(const AdjustedStart& start) {
   std::vector<double> sigmas;
   for (const FeatureState& feature : start.features) {
-    const int row = feature.offset + FeatureError::kInverseDepth;
+    const int row = feature.inverseDepthRow();
     sigmas.push_back(std::sqrt(std::max(start.covariance(row, row), 0.0)) / feature.inverse_depth);
   }
   return medianOf(std::move(sigmas));
@@ -87,22 +87,22 @@ std::optional<AdjustedStart> makeAdjustedStart(const CameraModel& model, const E
   for (std::size_t i = 0; i < ids.size(); ++i)
     if (filter.find(ids[i]) != nullptr) kept.push_back(static_cast<int>(i));
   const int F = static_cast<int>(kept.size());
-  start.covariance = Eigen::MatrixXd::Zero(CameraError::kSize + 6 * F, CameraError::kSize + 6 * F);
+  start.covariance.resize(CameraError::kSize + 3 * F, CameraError::kSize + 3 * F);
   auto camera = start.covariance.topLeftCorner<CameraError::kSize, CameraError::kSize>();
   camera = J * joint.topLeftCorner<kJoint, kJoint>() * J.transpose();
   camera = 0.5 * (camera + camera.transpose()).eval();
   for (int i = 0; i < F; ++i) {
     FeatureState feature = bundle.features[kept[i]];
     feature.id = ids[kept[i]];
-    feature.offset = CameraError::kSize + 6 * i;
+    feature.offset = CameraError::kSize + 3 * i;
     start.features.push_back(feature);
-    const int row = feature.offset + FeatureError::kBearing, from = kJoint + 3 * kept[i];
-    auto columns = start.covariance.middleCols<3>(row);
+    const int from = kJoint + 3 * kept[i];
+    auto columns = start.covariance.middleCols<3>(feature.offset);
     columns.topRows<CameraError::kSize>() = J * joint.block<kJoint, 3>(0, from);
-    start.covariance.block<3, CameraError::kSize>(row, 0) =
+    start.covariance.block<3, CameraError::kSize>(feature.offset, 0) =
         columns.topRows<CameraError::kSize>().transpose();
     for (int k = 0; k < F; ++k)
-      columns.middleRows<3>(CameraError::kSize + 6 * k + FeatureError::kBearing) =
+      columns.middleRows<3>(CameraError::kSize + 3 * k) =
           joint.block<3, 3>(kJoint + 3 * kept[k], from);
   }
   const FilterOptions& noise = filter.options();

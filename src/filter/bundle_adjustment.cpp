@@ -134,7 +134,7 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
       const double squared = squaredMiss(o, residual);
       const double weight = robustInformation(options, squared) / (o.noise * o.noise);
       N.cost += robustCost(options, squared);
-      const Matrix23 J = projection->d_feature.rightCols<3>(), weighted_J = weight * J;
+      const Matrix23 J = projection->d_feature.leftCols<3>(), weighted_J = weight * J;
       N.features[o.feature].noalias() += J.transpose() * weighted_J;
       N.feature_gradient.segment<3>(3 * o.feature) += weighted_J.transpose() * residual;
       const auto& D = o.d_calibration;

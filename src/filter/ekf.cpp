@@ -100,10 +100,9 @@ void Ekf::rescale(double factor) {
   camera_.position_world *= factor;
   camera_.velocity_world *= factor;
   for (FeatureState& feature : features_) {
-    scale.segment<3>(feature.offset).setConstant(factor);
     feature.rescale(factor);
-    if (feature.kind == FeatureKind::kInverseDepth)
-      scale[feature.offset + FeatureError::kInverseDepth] = 1.0 / factor;
+    if (feature.kind == FeatureKind::kInverseDepth) scale[feature.inverseDepthRow()] = 1.0 / factor;
+    if (!feature.anchored_at_origin) scale.segment<3>(feature.offset).setConstant(factor);
   }
   auto P = covariance_.view();
   for (int j = 0; j < P.cols(); ++j) {

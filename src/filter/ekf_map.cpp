@@ -10,12 +10,12 @@
 namespace active_matching_slam {
 namespace {
 
-/// d position / d (anchor, bearing, inverse depth) of p = a + m / rho.
-Eigen::Matrix<double, 3, 6> positionJacobian(const FeatureState& feature) {
+/// Of p = a + m / rho by the feature's error, 3 x size().
+Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> positionJacobian(const FeatureState& feature) {
   const double depth = 1.0 / feature.inverse_depth;
-  Eigen::Matrix<double, 3, 6> J;
-  J << Eigen::Matrix3d::Identity(), depth * feature.tangentBasis(),
-      -depth * depth * feature.bearing_world;
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> J(3, feature.size());
+  J.rightCols<3>() << depth * feature.tangentBasis(), -depth * depth * feature.bearing_world;
+  if (feature.hasAnchorError()) J.leftCols<3>().setIdentity();
   return J;
 }
 
@@ -77,25 +77,26 @@ FeatureId Ekf::addInverseDepthFeature(const CameraModel& camera, const Eigen::Ve
   const Eigen::Matrix<double, 2, 2> d_error_d_pixel =
       feature.tangentBasis().transpose() * R * d_bearing_d_pixel;
   const Eigen::Matrix<double, 2, 3> N = bearingGauge(feature);
+  const int o = feature.offset, bearing_row = feature.bearingRow() - o;
   using CameraJacobian = Eigen::Matrix<double, 6, CameraError::kSize>;
   CameraJacobian A = CameraJacobian::Zero();
   A.topRows<3>() = row.d_camera.topRows<3>();
-  A.middleRows<2>(FeatureError::kBearing) = N * row.d_camera.bottomRows<3>();
-  A.block<2, 4>(FeatureError::kBearing, CameraError::kFocal) -=
+  A.middleRows<2>(bearing_row) = N * row.d_camera.bottomRows<3>();
+  A.block<2, 4>(bearing_row, CameraError::kFocal) -=
       d_error_d_pixel * lens.pixelByCorrection(pixel);
   auto P = covariance_.view();
-  const int o = feature.offset;
   P.middleRows<6>(o).leftCols(o).noalias() = A * P.topLeftCorner(CameraError::kSize, o);
   P.topRightCorner(o, 6) = P.bottomLeftCorner(6, o).transpose();
   P.block<6, 6>(o, o) = P.block<6, CameraError::kSize>(o, 0) * A.transpose();
   // The pixel's noise turns the bearing, and it is another row that would have shown the feature.
   Eigen::Matrix<double, 6, 2> B = Eigen::Matrix<double, 6, 2>::Zero();
-  B.middleRows<2>(FeatureError::kBearing) = d_error_d_pixel;
+  B.middleRows<2>(bearing_row) = d_error_d_pixel;
   const double row_s = camera_.readout_s / camera.height();
   B.col(1).head<3>() += row_s * row.speed.head<3>();
-  B.col(1).segment<2>(FeatureError::kBearing) += row_s * N * row.speed.tail<3>();
+  B.col(1).segment<2>(bearing_row) += row_s * N * row.speed.tail<3>();
   P.block<6, 6>(o, o) += sigma_px * sigma_px * B * B.transpose();
-  P(o + FeatureError::kInverseDepth, o + FeatureError::kInverseDepth) += sigma_rho * sigma_rho;
+  const int rho = feature.inverseDepthRow();
+  P(rho, rho) += sigma_rho * sigma_rho;
   const Eigen::Matrix<double, 6, 6> own = P.block<6, 6>(o, o);
   P.block<6, 6>(o, o) = 0.5 * (own + own.transpose());
   return feature.id;
@@ -124,7 +125,7 @@ void Ekf::letCornersWander(const CameraModel& camera, double interval_s) {
     if (feature.kind == FeatureKind::kPoint)
       P.block<3, 3>(feature.offset, feature.offset) += variance * distance * distance * across;
     else
-      P.diagonal().segment<2>(feature.offset + FeatureError::kBearing).array() += variance;
+      P.diagonal().segment<2>(feature.bearingRow()).array() += variance;
   }
 }
 
@@ -155,12 +156,13 @@ std::vector<FeatureId> Ekf::convertToPoints() {
             options_.linearity_threshold) {
       const int o = feature.offset;
       const Eigen::Matrix3d own = positionCovariance(feature);
-      const Eigen::Matrix<double, 3, 6> J = positionJacobian(feature);
-      P.middleCols<3>(o) = (P.middleCols<6>(o) * J.transpose()).eval();
+      const auto J = positionJacobian(feature);
+      P.middleCols<3>(o) = (P.middleCols(o, feature.size()) * J.transpose()).eval();
       P.middleRows<3>(o) = P.middleCols<3>(o).transpose().eval();
       P.block<3, 3>(o, o) = own;
       feature.point_world = feature.position();
       feature.kind = FeatureKind::kPoint;
+      feature.anchored_at_origin = false;
       converted.push_back(feature.id);
     }
     ranges.emplace_back(feature.offset, feature.size());
@@ -175,15 +177,15 @@ std::vector<FeatureId> Ekf::convertToPoints() {
 Eigen::Matrix3d Ekf::positionCovariance(const FeatureState& feature) const {
   const auto P = covariance_.view();
   if (feature.kind == FeatureKind::kPoint) return P.block<3, 3>(feature.offset, feature.offset);
-  const Eigen::Matrix<double, 3, 6> J = positionJacobian(feature);
-  const Eigen::Matrix3d covariance =
-      J * P.block<6, 6>(feature.offset, feature.offset) * J.transpose();
+  const auto J = positionJacobian(feature);
+  const int o = feature.offset, size = feature.size();
+  const Eigen::Matrix3d covariance = J * P.block(o, o, size, size) * J.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 
 double Ekf::sigmaInverseDepth(const FeatureState& feature) const {
   if (feature.kind == FeatureKind::kPoint) return 0.0;
-  const int row = feature.offset + FeatureError::kInverseDepth;
+  const int row = feature.inverseDepthRow();
   return std::sqrt(std::max(0.0, covariance_.view()(row, row)));
 }
 

@@ -38,6 +38,9 @@ void checkFeature(const FeatureState& feature) {
       !feature.tangent_world.allFinite() || !std::isfinite(feature.inverse_depth) ||
       !feature.point_world.allFinite())
     refuse(name + " is not finite");
+  if (feature.anchored_at_origin &&
+      (feature.kind == FeatureKind::kPoint || !feature.anchor_world.isZero(0.0)))
+    refuse(name + " is not anchored at the origin, as it says");
   if (feature.kind == FeatureKind::kPoint) return;
   if (!isUnit(feature.bearing_world) || !isUnit(feature.tangent_world) ||
       std::abs(feature.bearing_world.dot(feature.tangent_world)) > kUnitTolerance)

@@ -55,6 +55,9 @@ std::optional<FeatureProjection> projectFromPose(const CameraModel& model,
   *d_pose << -rho * d_ray, d_ray * skew(ray_world);
   if (is_point) {
     projection.d_feature << d_ray, Eigen::Matrix<double, 2, 3>::Zero();
+  } else if (feature.anchored_at_origin) {
+    projection.d_feature << d_ray * feature.tangentBasis(), d_ray * from_camera,
+        Eigen::Matrix<double, 2, 3>::Zero();
   } else {
     projection.d_feature << rho * d_ray, d_ray * feature.tangentBasis(), d_ray * from_camera;
   }
@@ -94,15 +97,15 @@ std::optional<FeatureProjection> projectFeature(const CameraModel& model, const 
 Eigen::Matrix4d relativeCovariance(const FeatureState& feature,
                                    const CovarianceMatrix& covariance) {
   const auto P = covariance.view();
-  const int anchor = feature.offset + FeatureError::kAnchor;
-  const int rho = feature.offset + FeatureError::kInverseDepth;
-  const Eigen::Matrix3d cross = P.block<3, 3>(anchor, CameraError::kPosition);
+  const int anchor = feature.offset, rho = feature.inverseDepthRow();
   Eigen::Matrix4d V;
-  V.topLeftCorner<3, 3>() = P.block<3, 3>(anchor, anchor) +
-                            P.block<3, 3>(CameraError::kPosition, CameraError::kPosition) - cross -
-                            cross.transpose();
-  V.topRightCorner<3, 1>() =
-      P.block<3, 1>(anchor, rho) - P.block<3, 1>(CameraError::kPosition, rho);
+  V.topLeftCorner<3, 3>() = P.block<3, 3>(CameraError::kPosition, CameraError::kPosition);
+  V.topRightCorner<3, 1>() = -P.block<3, 1>(CameraError::kPosition, rho);
+  if (feature.hasAnchorError()) {
+    const Eigen::Matrix3d cross = P.block<3, 3>(anchor, CameraError::kPosition);
+    V.topLeftCorner<3, 3>() += P.block<3, 3>(anchor, anchor) - cross - cross.transpose();
+    V.topRightCorner<3, 1>() += P.block<3, 1>(anchor, rho);
+  }
   V.bottomLeftCorner<1, 3>() = V.topRightCorner<3, 1>().transpose();
   V(3, 3) = P(rho, rho);
   return V;

@@ -60,6 +60,7 @@ FeatureState seenFromOrigin(const FeatureState& feature) {
   const Eigen::Vector3d ray =
       is_point ? feature.point_world : weight * feature.anchor_world + feature.bearing_world;
   seen.kind = FeatureKind::kInverseDepth;
+  seen.anchored_at_origin = true;
   seen.anchor_world.setZero();
   seen.bearing_world = ray.normalized();
   seen.inverse_depth = weight / ray.norm();

@@ -34,12 +34,12 @@ void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& cam
   camera.q_world_camera = (rotationFromVector(theta) * camera.q_world_camera).normalized();
   for (FeatureState& feature : features) {
     if (feature.kind == FeatureKind::kPoint) {
-      feature.point_world += J * delta.segment<3>(feature.offset + FeatureError::kPoint);
+      feature.point_world += J * delta.segment<3>(feature.offset);
       continue;
     }
-    feature.anchor_world += J * delta.segment<3>(feature.offset + FeatureError::kAnchor);
-    turnBearing(delta.segment<2>(feature.offset + FeatureError::kBearing), theta, feature);
-    feature.inverse_depth += delta[feature.offset + FeatureError::kInverseDepth];
+    if (feature.hasAnchorError()) feature.anchor_world += J * delta.segment<3>(feature.offset);
+    turnBearing(delta.segment<2>(feature.bearingRow()), theta, feature);
+    feature.inverse_depth += delta[feature.inverseDepthRow()];
   }
 }
 
@@ -65,9 +65,9 @@ Eigen::MatrixXd gaugeGenerators(const CameraState& camera,
     if (feature.kind == FeatureKind::kPoint) {
       setPosition(feature.offset, feature.point_world);
     } else {
-      setPosition(feature.offset + FeatureError::kAnchor, feature.anchor_world);
-      G.block<2, 3>(feature.offset + FeatureError::kBearing, 0) = bearingGauge(feature);
-      G(feature.offset + FeatureError::kInverseDepth, 3) = -feature.inverse_depth;
+      if (feature.hasAnchorError()) setPosition(feature.offset, feature.anchor_world);
+      G.block<2, 3>(feature.bearingRow(), 0) = bearingGauge(feature);
+      G(feature.inverseDepthRow(), 3) = -feature.inverse_depth;
     }
   }
   return G;
@@ -85,7 +85,7 @@ Eigen::MatrixXd gaugeFunctionals(const CameraState& camera,
   for (const FeatureState& feature : features) {
     const int o = feature.offset;
     if (feature.kind == FeatureKind::kInverseDepth) {
-      const int row = o + FeatureError::kInverseDepth;
+      const int row = feature.inverseDepthRow();
       const double rho = feature.inverse_depth;
       const double weight = 1.0 / (std::max(P(row, row), 0.0) + kLeastVariance * rho * rho);
       scale[row] -= weight * rho;  // weight rho^2 times d rho / rho

@@ -12,12 +12,14 @@ namespace {
 
 /// Both line ends reveal a transfer as text.
 constexpr char kMagic[9] = "AMSMAP\r\n";
-constexpr std::uint32_t kVersion = 3;
+constexpr std::uint32_t kVersion = 4;
 constexpr std::size_t kHeaderSize = 8 + 4 + 4 + 8;
 constexpr std::size_t kMaximumName = 1024, kMaximumDistortion = 16;
 constexpr std::size_t kMinimumFeature = 8 + 1 + 13 * 8;  ///< bytes of a FeatureState
 constexpr int kMaximumPatchSize = 255;
 constexpr std::int64_t kMaximumRateCount = std::int64_t{1} << 53;
+/// How a feature's kind is stored.
+enum : std::uint8_t { kStoredInverseDepth, kStoredPoint, kStoredInverseDepthFromOrigin, kKinds };
 
 class Writer {
  public:
@@ -145,7 +147,9 @@ CameraState readCameraState(std::uint32_t version, Reader* in) {
 
 void write(const FeatureState& feature, Writer* out) {
   out->integer(feature.id);
-  out->number(static_cast<std::uint8_t>(feature.kind == FeatureKind::kPoint));
+  out->number(static_cast<std::uint8_t>(feature.kind == FeatureKind::kPoint ? kStoredPoint
+                                        : feature.anchored_at_origin ? kStoredInverseDepthFromOrigin
+                                                                     : kStoredInverseDepth));
   out->reals(feature.anchor_world);
   out->reals(feature.bearing_world);
   out->reals(feature.tangent_world);
@@ -157,8 +161,9 @@ FeatureState readFeatureState(Reader* in, int offset) {
   FeatureState feature;
   feature.id = in->integer();
   const auto kind = in->number<std::uint8_t>();
-  if (kind > 1) throw std::runtime_error("feature of unknown kind " + std::to_string(kind));
-  feature.kind = kind == 1 ? FeatureKind::kPoint : FeatureKind::kInverseDepth;
+  if (kind >= kKinds) throw std::runtime_error("feature of unknown kind " + std::to_string(kind));
+  feature.kind = kind == kStoredPoint ? FeatureKind::kPoint : FeatureKind::kInverseDepth;
+  feature.anchored_at_origin = kind == kStoredInverseDepthFromOrigin;
   feature.offset = offset;
   in->reals(feature.anchor_world);
   in->reals(feature.bearing_world);

@@ -22,6 +22,7 @@ inline Bundle exampleBundle(const CameraModel& model, int cameras, int features,
   for (int i = 0; i < features; ++i) {
     FeatureState feature;
     feature.id = i;
+    feature.anchored_at_origin = true;
     feature.bearing_world = model.unproject(random.pixel())->normalized();
     feature.tangent_world = feature.bearing_world.cross(Eigen::Vector3d::UnitY()).normalized();
     feature.inverse_depth = random.uniform(0.4, 1.6);

@@ -114,7 +114,29 @@ inline std::vector<FeatureMeasurement> noisyMeasurements(const Ekf& filter,
   return measurements;
 }
 
-/// A filter in mid-flight: inverse-depth features of several ages and known points, all correlated.
+/// Lets an empty filter begin with features anchored at the origin, a little correlated.
+inline void startFromOrigin(const CameraModel& model, int features, Random& random, Ekf* filter) {
+  const int old_size = filter->stateSize(), size = old_size + 3 * features;
+  std::vector<FeatureState> states(features);
+  for (int i = 0; i < features; ++i) {
+    FeatureState& state = states[i];
+    state.id = i;
+    state.anchored_at_origin = true;
+    state.bearing_world = filter->camera().q_world_camera * *model.unproject(random.pixel());
+    state.bearing_world.normalize();
+    state.tangent_world = state.bearing_world.cross(Eigen::Vector3d::UnitY()).normalized();
+    state.inverse_depth = random.uniform(0.4, 1.0);
+  }
+  Eigen::MatrixXd A(3 * features, 3 * features + 3);
+  for (Eigen::Index i = 0; i < A.size(); ++i) A.data()[i] = random.normal(0.01);
+  Eigen::MatrixXd P = Eigen::MatrixXd::Zero(size, size);
+  P.topLeftCorner(old_size, old_size) = filter->covariance();
+  P.bottomRightCorner(size - old_size, size - old_size) = A * A.transpose();
+  filter->restore(filter->camera(), states, P, features);
+}
+
+/// A filter in mid-flight: features anchored at the origin, inverse-depth features of several ages
+/// and known points, all correlated.
 /// Of `calibration` the readout and the lens are taken.
 inline Ekf exampleFilter(const CameraModel& model, unsigned seed, int features = 6,
                          const CameraState& calibration = CameraState(),
@@ -125,6 +147,8 @@ inline Ekf exampleFilter(const CameraModel& model, unsigned seed, int features =
   camera.readout_s = calibration.readout_s;
   camera.lens = calibration.lens;
   filter.reset(camera, exampleCameraCovariance(random));
+  Random others(seed + 1000);
+  startFromOrigin(model, 2, others, &filter);
   for (int step = 0; step < 4; ++step) {
     filter.predict(0.05);
     filter.update(model, noisyMeasurements(filter, model, 1.0, random));
@@ -162,10 +186,10 @@ inline Eigen::VectorXd errorBetween(const CameraState& camera,
     if (a.kind == FeatureKind::kPoint) {
       delta.segment<3>(a.offset) = b.point_world - a.point_world;
     } else {
-      delta.segment<3>(a.offset) = b.anchor_world - a.anchor_world;
-      delta.segment<2>(a.offset + FeatureError::kBearing) =
+      if (a.hasAnchorError()) delta.segment<3>(a.offset) = b.anchor_world - a.anchor_world;
+      delta.segment<2>(a.bearingRow()) =
           a.tangentBasis().transpose() * (b.bearing_world - a.bearing_world);
-      delta[a.offset + FeatureError::kInverseDepth] = b.inverse_depth - a.inverse_depth;
+      delta[a.inverseDepthRow()] = b.inverse_depth - a.inverse_depth;
     }
   }
   return delta;

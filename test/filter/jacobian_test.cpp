@@ -167,8 +167,8 @@ TEST(MeasurementModel, RelativeCovarianceIsThatOfTheDifferences) {
     if (feature.kind != FeatureKind::kInverseDepth) continue;
     Eigen::MatrixXd D = Eigen::MatrixXd::Zero(4, filter.stateSize());
     D.topLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-    D.block<3, 3>(0, feature.offset).setIdentity();
-    D(3, feature.offset + FeatureError::kInverseDepth) = 1.0;
+    if (feature.hasAnchorError()) D.block<3, 3>(0, feature.offset).setIdentity();
+    D(3, feature.inverseDepthRow()) = 1.0;
     const Eigen::Matrix4d expected = D * P.view() * D.transpose();
     EXPECT_LT((relativeCovariance(feature, P) - expected).norm(), 1e-12);
   }
@@ -234,7 +234,8 @@ TEST_F(Gauge, FunctionalsReadOffTheirOwnFreedomAndNoTranslation) {
   Eigen::MatrixXd translation = Eigen::MatrixXd::Zero(size, 3);
   translation.middleRows<3>(CameraError::kPosition).setIdentity();
   for (const FeatureState& feature : filter_.features())
-    translation.middleRows<3>(feature.offset).setIdentity();
+    if (feature.hasAnchorError() || feature.kind == FeatureKind::kPoint)
+      translation.middleRows<3>(feature.offset).setIdentity();
   EXPECT_LT((L.transpose() * translation).norm(), 1e-12);
 }
 

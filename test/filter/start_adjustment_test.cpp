@@ -53,7 +53,7 @@ class StartOfATrack {
   void beSure(double relative_sigma) {
     Eigen::MatrixXd covariance = filter_.covariance();
     for (const FeatureState& feature : filter_.features()) {
-      const int row = feature.offset + FeatureError::kInverseDepth;
+      const int row = feature.inverseDepthRow();
       covariance.row(row).setZero();
       covariance.col(row).setZero();
       covariance(row, row) = std::pow(relative_sigma * feature.inverse_depth, 2);
@@ -271,7 +271,7 @@ TEST(StartAdjustment, ABlurredImageCountsForLess) {
 double depthSigma(const AdjustedStart& adjusted) {
   std::vector<double> sigmas;
   for (const FeatureState& feature : adjusted.features) {
-    const int row = feature.offset + FeatureError::kInverseDepth;
+    const int row = feature.inverseDepthRow();
     sigmas.push_back(std::sqrt(adjusted.covariance(row, row)) / feature.inverse_depth);
   }
   return medianOf(std::move(sigmas));
@@ -424,7 +424,7 @@ TEST(StartAdjustment, ASettledReadingIsAdjustedFurtherFromWhatTheFilterBelieves)
     double squares = 0.0, variances = 0.0;
     for (const FeatureState& feature : adjusted->features) {
       const double by_truth = feature.inverse_depth / sum * true_sum / trueInverseDepth(feature);
-      const int row = feature.offset + FeatureError::kInverseDepth;
+      const int row = feature.inverseDepthRow();
       squares += std::pow(by_truth - 1.0, 2);
       variances += adjusted->covariance(row, row) / std::pow(feature.inverse_depth, 2);
     }

@@ -137,6 +137,24 @@ TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
   EXPECT_EQ(serializeMap(read), serializeMap(written));
 }
 
+TEST_F(MapFile, AnAnchorAtTheOriginStaysThere) {
+  MapFileContent content = smallMap();
+  FeatureState& last = content.features.back();
+  last.anchored_at_origin = true;
+  last.anchor_world.setZero();
+  const Eigen::Index n = content.covariance.rows();  // of which the last six are its own
+  Eigen::MatrixXd P(n - 3, n - 3);
+  P << content.covariance.topLeftCorner(n - 6, n - 6), content.covariance.topRightCorner(n - 6, 3),
+      content.covariance.bottomLeftCorner(3, n - 6), content.covariance.bottomRightCorner(3, 3);
+  content.covariance = P;
+  const MapFileContent read = parseMap(serializeMap(content));
+  EXPECT_TRUE(read.features.back().anchored_at_origin);
+  EXPECT_FALSE(read.features.front().anchored_at_origin);
+  EXPECT_EQ(read.features.back().size(), 3);
+  EXPECT_EQ(read.covariance, P);
+  EXPECT_EQ(serializeMap(read), serializeMap(content));
+}
+
 TEST_F(MapFile, AFilterGoesOnFromItAsIfNeverStopped) {
   const MapFileContent content = smallMap();
   const CameraModel camera(content.camera);
@@ -212,8 +230,8 @@ TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
   bytes[bytes.size() / 2] ^= 1;
   expectRefused(bytes, "damaged");
   bytes = serializeMap(smallMap());
-  setNumber(&bytes, 8, 4, 4);
-  expectRefused(bytes, "version 4");
+  setNumber(&bytes, 8, 5, 4);
+  expectRefused(bytes, "version 5");
   bytes = serializeMap(smallMap());
   double infinity = std::numeric_limits<double>::infinity();
   std::memcpy(&bytes[bytes.size() - 8], &infinity, 8);

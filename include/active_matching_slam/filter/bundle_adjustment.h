@@ -21,7 +21,8 @@ struct BundleObservation {
 };
 
 /// Cameras, features and calibration to be adjusted together. The first camera is the world: it
-/// stays at the origin, and every feature is anchored there (inverse depth).
+/// stays at the origin, and every feature is anchored there (inverse depth,
+/// FeatureState::anchored_at_origin).
 struct Bundle {
   std::vector<CameraState> cameras;  ///< of all but the pose nothing is read or changed
   std::vector<FeatureState> features;

@@ -10,10 +10,12 @@ using FeatureId = std::int64_t;
 enum class FeatureKind { kInverseDepth, kPoint };
 
 /// Mean of a map feature (Chli 2009, eq. 3.4). Error state: inverse depth 6 = anchor (3), bearing
-/// (2, tangent of the unit sphere), inverse depth (1); point 3.
+/// (2, tangent of the unit sphere), inverse depth (1); point 3. One whose anchor is the world's
+/// origin itself, of which nothing can be uncertain, has no error of the anchor: 3.
 struct FeatureState {
   FeatureId id = -1;
   FeatureKind kind = FeatureKind::kInverseDepth;
+  bool anchored_at_origin = false;                         ///< kInverseDepth only
   int offset = 0;                                          ///< first row in the filter's covariance
   Eigen::Vector3d anchor_world = Eigen::Vector3d::Zero();  ///< camera centre at first sight
   Eigen::Vector3d bearing_world = Eigen::Vector3d::UnitZ();  ///< m(theta, phi), unit
@@ -34,18 +36,18 @@ struct FeatureState {
     point_world *= factor;
     if (kind == FeatureKind::kInverseDepth) inverse_depth /= factor;
   }
-  int size() const { return kind == FeatureKind::kInverseDepth ? 6 : 3; }
+  /// Rows of its error in the filter's covariance, from `offset`.
+  int size() const { return hasAnchorError() ? 6 : 3; }
+  bool hasAnchorError() const { return kind == FeatureKind::kInverseDepth && !anchored_at_origin; }
+  /// First rows of the parts of its error; that of the anchor, and of a point, is `offset`.
+  int bearingRow() const { return anchored_at_origin ? offset : offset + 3; }
+  int inverseDepthRow() const { return bearingRow() + 2; }
   /// Position in the world (for inverse depth the mean's; far away as rho -> 0).
   Eigen::Vector3d position() const {
     return kind == FeatureKind::kPoint
                ? point_world
                : Eigen::Vector3d(anchor_world + bearing_world / inverse_depth);
   }
-};
-
-/// Order of a feature's error state, from its offset.
-struct FeatureError {
-  static constexpr int kAnchor = 0, kBearing = 3, kInverseDepth = 5, kPoint = 0;
 };
 
 }  // namespace active_matching_slam
