@@ -13,6 +13,30 @@ namespace {
 constexpr double kNonlinearityTolerance = 0.2;
 /// A measurement's squared distance from what all others say of it, in sigmas; of 2 expected.
 constexpr double kStrayChi2 = 9.0;
+constexpr Eigen::Index kColumns = 32;  ///< of triangular matrices taken at once
+
+/// U^-1 with S = U U^T, by columns that are zero above the diagonal.
+Eigen::MatrixXd inverseRoot(const Eigen::LLT<Eigen::MatrixXd>& llt) {
+  const Eigen::Index n = llt.rows();
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(n, n);
+  for (Eigen::Index k = 0; k < n; k += kColumns) {
+    auto columns = inverse.block(k, k, n - k, std::min(kColumns, n - k));
+    llt.matrixLLT()
+        .bottomRightCorner(n - k, n - k)
+        .triangularView<Eigen::Lower>()
+        .solveInPlace(columns);
+  }
+  return inverse;
+}
+
+/// X <- X L^T, L lower triangular: by matrix products, which are faster than to solve with L^-1.
+void timesTransposeOf(const Eigen::MatrixXd& L, Eigen::Ref<Eigen::MatrixXd> X) {
+  for (Eigen::Index end = L.rows(); end > 0;) {
+    const Eigen::Index columns = std::min(kColumns, end), k = end - columns;
+    X.middleCols(k, columns) = (X.leftCols(end) * L.block(k, 0, columns, end).transpose()).eval();
+    end = k;
+  }
+}
 
 }  // namespace
 
@@ -43,7 +67,10 @@ MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState
   prior_gauge_ = gaugeGenerators(camera, features, n);
   C_ = Eigen::MatrixXd::Zero(n, kGaugeFreedoms);
   L_ = active_matching_slam::gaugeFunctionals(camera, features, covariance);
-  PL_ = covariance.view() * L_;
+  // That of the rotation is the camera's own.
+  PL_.resize(n, kGaugeFreedoms);
+  PL_.leftCols<3>() = covariance.view().middleCols<3>(CameraError::kRotation);
+  PL_.col(3).noalias() = covariance.view() * L_.col(3);
 }
 
 bool MeasurementUpdate::linearise() {
@@ -65,25 +92,10 @@ void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) const {
   }
 }
 
-/// U^-1 with S = U U^T, by columns that are zero above the diagonal.
-Eigen::MatrixXd MeasurementUpdate::inverseRoot() const {
-  constexpr Eigen::Index kColumns = 32;
-  const Eigen::Index n = llt_.rows();
-  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(n, n);
-  for (Eigen::Index k = 0; k < n; k += kColumns) {
-    auto columns = inverse.block(k, k, n - k, std::min(kColumns, n - k));
-    llt_.matrixLLT()
-        .bottomRightCorner(n - k, n - k)
-        .triangularView<Eigen::Lower>()
-        .solveInPlace(columns);
-  }
-  return inverse;
-}
-
 /// `weighted`: S^-1 y for the innovation y. Of what the others leave of y_i, the covariance is the
 /// inverse of that block of S^-1, and itself that times the block of S^-1 y. Whether there are any.
 bool MeasurementUpdate::doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S) {
-  const Eigen::MatrixXd inverse_root = inverseRoot();
+  const Eigen::MatrixXd inverse_root = inverseRoot(llt_);
   bool any = false;
   noise_left_.clear();
   for (Eigen::Index i = 0; i < weighted.size() / 2; ++i) {
@@ -175,7 +187,7 @@ Eigen::MatrixXd MeasurementUpdate::finish() {
   const auto motion = X_.topRows<CameraError::kMotionSize>();
   const Eigen::MatrixXd gain = llt_.solve(motion.transpose());  // transposed
   Eigen::MatrixXd more = gain.transpose() * X_.transpose();
-  lasting_llt_.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(X_);
+  timesTransposeOf(inverseRoot(lasting_llt_), X_);
   more.noalias() -= motion * X_.transpose();
   return more;
 }

@@ -54,7 +54,6 @@ class MeasurementUpdate {
   bool linearise();
   bool step(bool first);
   void addNoise(Eigen::MatrixXd& S) const;
-  Eigen::MatrixXd inverseRoot() const;
   bool doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S);
   bool isLinearEnough(const Eigen::VectorXd& expected_pixels) const;
 

@@ -285,8 +285,10 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
   frame->match_sigma_px = match_noise_.sigma_px(options_.filter);
   for (FeatureMeasurement& match : fused) {
     map_.seeNoise(match.id, match.sigma_px / match_noise_.ofImage());
-    match.sigma_px = match_noise_.sigma_px(options_.filter, map_.find(match.id)->noise);
-    match.repetitions = match_noise_.repetitions();
+    const MapFeature& feature = *map_.find(match.id);
+    match.sigma_px = match_noise_.sigma_px(options_.filter, feature.noise);
+    // A known point lies where it was said to, whatever its first images showed.
+    if (!feature.known) match.repetitions = match_noise_.repetitions();
   }
   fused_ = std::move(fused);
 

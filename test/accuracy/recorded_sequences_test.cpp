@@ -87,7 +87,7 @@ TEST_F(RecordedSequences, DeskAndCheckerboardAreTrackedAtThreeTimesTheSpeed) {
 TEST_F(RecordedSequences, DeskIsTrackedToScaleWithItsTarget) {
   const TrackedRun run = trackAll("davison_monoslam_desk", 1, {}, true);
   EXPECT_EQ(static_cast<int>(run.tracked.size()), run.frames);
-  EXPECT_LE(errorMm(run, "davison_monoslam_desk", AlignmentKind::kRigid), 30.0);
+  EXPECT_LE(errorMm(run, "davison_monoslam_desk", AlignmentKind::kRigid), 20.0);
 }
 
 TEST_F(RecordedSequences, CheckerboardIsTrackedThroughRepeatedTexture) {
