@@ -67,7 +67,7 @@ MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState
   prior_gauge_ = gaugeGenerators(camera, features, n);
   C_ = Eigen::MatrixXd::Zero(n, kGaugeFreedoms);
   L_ = active_matching_slam::gaugeFunctionals(camera, features, covariance);
-  // That of the rotation is the camera's own.
+  // L reads the rotation off the camera alone: what P makes of that are columns of its own.
   PL_.resize(n, kGaugeFreedoms);
   PL_.leftCols<3>() = covariance.view().middleCols<3>(CameraError::kRotation);
   PL_.col(3).noalias() = covariance.view() * L_.col(3);

@@ -136,8 +136,7 @@ inline void startFromOrigin(const CameraModel& model, int features, Random& rand
 }
 
 /// A filter in mid-flight: features anchored at the origin, inverse-depth features of several ages
-/// and known points, all correlated.
-/// Of `calibration` the readout and the lens are taken.
+/// and known points, all correlated. Of `calibration` the readout and the lens are taken.
 inline Ekf exampleFilter(const CameraModel& model, unsigned seed, int features = 6,
                          const CameraState& calibration = CameraState(),
                          const FilterOptions& options = exampleOptions()) {
