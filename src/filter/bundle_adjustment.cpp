@@ -4,10 +4,12 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/rotation.h"
+#include "active_matching_slam/filter/triangular.h"
 
 namespace active_matching_slam {
 namespace {
@@ -74,10 +76,10 @@ double depthCost(const BundleOptions& options, const Bundle& bundle) {
   return squares / (options.sigma_inverse_depth * options.sigma_inverse_depth);
 }
 
-double bundleCost(const CameraModel& model, const BundleOptions& options, const Bundle& bundle) {
-  double cost =
-      depthCost(options, bundle) +
-      bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
+/// Calls visit(image, observation, squaredMiss) for all image points; infinite where the feature
+/// does not project.
+template <typename Visit>
+void forEachMiss(const CameraModel& model, const Bundle& bundle, const Visit& visit) {
   for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
     const CameraState& camera = bundle.cameras[k];
     const Eigen::Matrix3d R_camera_world = camera.q_world_camera.toRotationMatrix().transpose();
@@ -85,10 +87,20 @@ double bundleCost(const CameraModel& model, const BundleOptions& options, const 
       const FeatureState& feature = bundle.features[o.feature];
       const auto pixel = model.project(
           R_camera_world * (feature.bearing_world - feature.inverse_depth * camera.position_world));
-      cost += pixel ? robustCost(options, squaredMiss(o, plainPixel(bundle, o) - *pixel))
-                    : kCostOfInvisible;
+      visit(k, o,
+            pixel ? squaredMiss(o, plainPixel(bundle, o) - *pixel)
+                  : std::numeric_limits<double>::infinity());
     }
   }
+}
+
+double bundleCost(const CameraModel& model, const BundleOptions& options, const Bundle& bundle) {
+  double cost =
+      depthCost(options, bundle) +
+      bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
+  forEachMiss(model, bundle, [&](std::size_t, const BundleObservation&, double squared_px) {
+    cost += std::isfinite(squared_px) ? robustCost(options, squared_px) : kCostOfInvisible;
+  });
   return cost;
 }
 
@@ -242,26 +254,14 @@ void applyStep(const BundleOptions& options, const Eigen::VectorXd& cameras,
   }
 }
 
-/// Calls visit(image, observation, square of what it misses per axis) for all that project.
-template <typename Visit>
-void forEachMiss(const CameraModel& model, const Bundle& bundle, const Visit& visit) {
-  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
-    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
-    for (const BundleObservation& o : bundle.observations[k]) {
-      Matrix26 d_pose;
-      const auto projection = projectFromPose(model, bundle.cameras[k].position_world, R,
-                                              bundle.features[o.feature], &d_pose);
-      if (projection) visit(k, o, 0.5 * squaredMiss(o, plainPixel(bundle, o) - projection->pixel));
-    }
-  }
-}
-
+/// Root mean squares per axis of what is missed, of all that project.
 class MeanSquares {
  public:
   explicit MeanSquares(std::size_t size) : sums_(size, 0.0), counts_(size, 0.0) {}
 
-  void add(std::size_t i, double square) {
-    sums_[i] += square;
+  void add(std::size_t i, double squared, double most) {
+    if (!std::isfinite(squared)) return;
+    sums_[i] += std::min(0.5 * squared, most * most);
     counts_[i] += 1.0;
   }
 
@@ -339,22 +339,22 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   const int cameras = static_cast<int>(N.cameras.rows()), kept = cameras - 6 * (first_camera - 1);
   const int F = static_cast<int>(N.features.size());
   // With S = R R^T the cameras' equations, W the cross terms and B = diag(L^-1), the covariance is
-  // M^T M + diag(0, B^T B), where M = R^-1 [1, -W L^-T B].
-  Eigen::MatrixXd M(cameras, kept + 3 * F);
-  M.leftCols(kept) = Eigen::MatrixXd::Identity(cameras, cameras).rightCols(kept);
+  // M M^T + diag(0, B^T B), where M = [1, -W L^-T B]^T R^-T.
+  Eigen::MatrixXd M(kept + 3 * F, cameras);
+  M.topRows(kept) = Eigen::MatrixXd::Identity(cameras, cameras).bottomRows(kept);
   for (int i = 0; i < F; ++i) {
-    M.middleCols<3>(kept + 3 * i).noalias() =
-        -reduced->cross.middleCols<3>(3 * i).lazyProduct(reduced->inverse_roots[i]);
+    M.middleRows<3>(kept + 3 * i).noalias() = -reduced->inverse_roots[i].transpose().lazyProduct(
+        reduced->cross.middleCols<3>(3 * i).transpose());
   }
-  reduced->factor.matrixL().solveInPlace(M);
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(M.cols(), M.cols());
+  timesTransposeOf(inverseRoot(reduced->factor), M);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(M.rows(), M.rows());
   auto lower = covariance.selfadjointView<Eigen::Lower>();
-  lower.rankUpdate(M.transpose());
+  lower.rankUpdate(M);
   for (int i = 0; i < F; ++i)
     covariance.block<3, 3>(kept + 3 * i, kept + 3 * i) +=
         reduced->inverse_roots[i].transpose() * reduced->inverse_roots[i];
   // The unit is known as well as said: one more measurement.
-  Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.cols());
+  Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.rows());
   for (int i = 0; i < F; ++i)
     depths[kept + 3 * i + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
   const Eigen::VectorXd along = lower * depths;
@@ -366,8 +366,8 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
 
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle) {
   MeanSquares errors(bundle.features.size());
-  forEachMiss(model, bundle, [&errors](std::size_t, const BundleObservation& o, double squared_px) {
-    errors.add(o.feature, squared_px);
+  forEachMiss(model, bundle, [&](std::size_t, const BundleObservation& o, double squared_px) {
+    errors.add(o.feature, squared_px, std::numeric_limits<double>::infinity());
   });
   return errors.roots();
 }
@@ -375,7 +375,7 @@ std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle
 std::vector<double> imageErrors(const CameraModel& model, const Bundle& bundle, double most_px) {
   MeanSquares errors(bundle.cameras.size());
   forEachMiss(model, bundle, [&](std::size_t k, const BundleObservation&, double squared_px) {
-    errors.add(k, std::min(squared_px, most_px * most_px));
+    errors.add(k, squared_px, most_px);
   });
   return errors.roots();
 }

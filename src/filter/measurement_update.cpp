@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "active_matching_slam/filter/state_error.h"
+#include "active_matching_slam/filter/triangular.h"
 
 namespace active_matching_slam {
 namespace {
@@ -13,30 +14,6 @@ namespace {
 constexpr double kNonlinearityTolerance = 0.2;
 /// A measurement's squared distance from what all others say of it, in sigmas; of 2 expected.
 constexpr double kStrayChi2 = 9.0;
-constexpr Eigen::Index kColumns = 32;  ///< of triangular matrices taken at once
-
-/// U^-1 with S = U U^T, by columns that are zero above the diagonal.
-Eigen::MatrixXd inverseRoot(const Eigen::LLT<Eigen::MatrixXd>& llt) {
-  const Eigen::Index n = llt.rows();
-  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(n, n);
-  for (Eigen::Index k = 0; k < n; k += kColumns) {
-    auto columns = inverse.block(k, k, n - k, std::min(kColumns, n - k));
-    llt.matrixLLT()
-        .bottomRightCorner(n - k, n - k)
-        .triangularView<Eigen::Lower>()
-        .solveInPlace(columns);
-  }
-  return inverse;
-}
-
-/// X <- X L^T, L lower triangular: by matrix products, which are faster than to solve with L^-1.
-void timesTransposeOf(const Eigen::MatrixXd& L, Eigen::Ref<Eigen::MatrixXd> X) {
-  for (Eigen::Index end = L.rows(); end > 0;) {
-    const Eigen::Index columns = std::min(kColumns, end), k = end - columns;
-    X.middleCols(k, columns) = (X.leftCols(end) * L.block(k, 0, columns, end).transpose()).eval();
-    end = k;
-  }
-}
 
 }  // namespace
 

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+namespace active_matching_slam {
+
+/// L^-1, n x n, zero above the diagonal, where L L^T is what `llt` has factored: its inverse is
+/// L^-T L^-1.
+Eigen::MatrixXd inverseRoot(const Eigen::LLT<Eigen::MatrixXd>& llt);
+
+/// X <- X L^T for a lower triangular L, n x n, and X with n columns: by matrix products, which are
+/// faster than to solve with L^-1.
+void timesTransposeOf(const Eigen::MatrixXd& L, Eigen::Ref<Eigen::MatrixXd> X);
+
+}  // namespace active_matching_slam
