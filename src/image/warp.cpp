@@ -10,24 +10,32 @@
 namespace active_matching_slam {
 namespace {
 
+constexpr int kRow = 8;  ///< numbers taken at once: the taps and what fills a vector
+
 /// Interpolates at positions from (-0.5, -0.5) on; beyond the rim the outermost pixels repeat.
 float sample(const cv::Mat& image, double u, double v) {
   // Truncation is the floor of what is positive, and far cheaper.
   const int at_u = static_cast<int>(u + 1.0) - 1, at_v = static_cast<int>(v + 1.0) - 1;
-  float weights_u[kTaps], weights_v[kTaps];
+  const int first_u = at_u - kTapsBefore, first_v = at_v - kTapsBefore;
+  float weights_u[kRow] = {}, weights_v[kTaps];
   interpolationWeights(u - at_u, weights_u);
   interpolationWeights(v - at_v, weights_v);
-  int columns[kTaps];
-  for (int i = 0; i < kTaps; ++i)
-    columns[i] = std::clamp(at_u - kTapsBefore + i, 0, image.cols - 1);
-  float value = 0.0f;
-  for (int j = 0; j < kTaps; ++j) {
-    const int at_row = std::clamp(at_v - kTapsBefore + j, 0, image.rows - 1);
-    const std::uint8_t* row = image.ptr<std::uint8_t>(at_row);
-    float along = 0.0f;
-    for (int i = 0; i < kTaps; ++i) along += weights_u[i] * row[columns[i]];
-    value += weights_v[j] * along;
+  float columns[kRow] = {};
+  if (first_u >= 0 && first_v >= 0 && first_u + kRow <= image.cols &&
+      first_v + kTaps <= image.rows) {
+    for (int j = 0; j < kTaps; ++j) {
+      const std::uint8_t* row = image.ptr<std::uint8_t>(first_v + j) + first_u;
+      for (int i = 0; i < kRow; ++i) columns[i] += weights_v[j] * static_cast<float>(row[i]);
+    }
+  } else {
+    for (int j = 0; j < kTaps; ++j) {
+      const auto* row = image.ptr<std::uint8_t>(std::clamp(first_v + j, 0, image.rows - 1));
+      for (int i = 0; i < kTaps; ++i)
+        columns[i] += weights_v[j] * row[std::clamp(first_u + i, 0, image.cols - 1)];
+    }
   }
+  float value = 0.0f;
+  for (int i = 0; i < kTaps; ++i) value += weights_u[i] * columns[i];
   return value;
 }
 
@@ -54,6 +62,39 @@ Eigen::Matrix<double, 2, 3> secondDerivatives(const Source& source) {
   return result / (h * h);
 }
 
+/// The homography of a patch's plane. With that plane n^T X = d through the point, n^T bearing = 1,
+/// X = b d / (n . b) along a ray b, so R X + t is parallel to (R + t n^T / d) b (Hartley &
+/// Zisserman 2004, section 13.1). The inverse depth along b grows by d(n . b), which is the slope;
+/// where the patch faces the first camera, n is the bearing, and that is none.
+struct PatchPlane {
+  Eigen::Vector3d bearing;                        ///< of the feature in the first camera
+  Eigen::Matrix<double, 3, 2> d_bearing_d_first;  ///< by the pixel at first sight
+  Eigen::Matrix3d R_now_first;
+  Eigen::Vector3d shift;  ///< t / d, in the camera now
+};
+
+/// Empty when the point is at the first camera's centre or that does not see it, or not finite.
+std::optional<PatchPlane> planeOf(const SourcePatch& patch, const CameraModel& camera,
+                                  const Eigen::Isometry3d& T_world_camera_now,
+                                  const Eigen::Vector4d& point_world_homogeneous) {
+  const Eigen::Isometry3d& T_world_first = patch.T_world_camera;
+  const double w = point_world_homogeneous.w();
+  const double distance =
+      (point_world_homogeneous.head<3>() - w * T_world_first.translation()).norm();
+  if (!(distance > 0.0) || !(w >= 0.0)) return std::nullopt;
+  const double inverse_distance = w / distance;  // from the first camera
+  if (!std::isfinite(inverse_distance)) return std::nullopt;
+  PatchPlane plane;
+  const auto bearing = camera.unproject(patch.pixel, &plane.d_bearing_d_first);
+  if (!bearing) return std::nullopt;
+  plane.bearing = *bearing;
+  const Eigen::Matrix3d R_now_world = T_world_camera_now.linear().transpose();
+  plane.R_now_first = R_now_world * T_world_first.linear();
+  plane.shift = inverse_distance *
+                (R_now_world * (T_world_first.translation() - T_world_camera_now.translation()));
+  return plane;
+}
+
 }  // namespace
 
 Eigen::Vector4d homogeneousPosition(const FeatureState& feature) {
@@ -67,31 +108,13 @@ Eigen::Vector4d homogeneousPosition(const FeatureState& feature) {
   return point;
 }
 
-std::optional<PatchView> predictPatchView(const SourcePatch& patch, const CameraModel& camera,
-                                          const Eigen::Isometry3d& T_world_camera_now,
-                                          const Eigen::Vector4d& point_world_homogeneous) {
-  const Eigen::Isometry3d& T_world_first = patch.T_world_camera;
-  const double w = point_world_homogeneous.w();
-  const double distance =
-      (point_world_homogeneous.head<3>() - w * T_world_first.translation()).norm();
-  if (!(distance > 0.0) || !(w >= 0.0)) return std::nullopt;
-  const double inverse_distance = w / distance;  // from the first camera
-  if (!std::isfinite(inverse_distance)) return std::nullopt;
-
-  Eigen::Matrix<double, 3, 2> d_bearing_d_first;
-  const std::optional<Eigen::Vector3d> bearing = camera.unproject(patch.pixel, &d_bearing_d_first);
-  if (!bearing) return std::nullopt;
-
-  // The plane n^T X = d through the point, n^T bearing = 1: X = b d / (n . b) along a ray b, so
-  // R X + t is parallel to (R + t n^T / d) b (Hartley & Zisserman 2004, section 13.1). The inverse
-  // depth along b grows by d(n . b), which is the slope; where the patch faces the first camera, n
-  // is the bearing, and that is none.
-  const Eigen::Matrix3d R_now_world = T_world_camera_now.linear().transpose();
-  const Eigen::Matrix3d R_now_first = R_now_world * T_world_first.linear();
-  const Eigen::Vector3d t_now_first =
-      R_now_world * (T_world_first.translation() - T_world_camera_now.translation());
-  const Eigen::Vector3d shift = inverse_distance * t_now_first;
-  const Eigen::Vector3d point_now = R_now_first * *bearing + shift;
+std::optional<PatchView> predictFlatView(const SourcePatch& patch, const CameraModel& camera,
+                                         const Eigen::Isometry3d& T_world_camera_now,
+                                         const Eigen::Vector4d& point_world_homogeneous) {
+  const auto plane = planeOf(patch, camera, T_world_camera_now, point_world_homogeneous);
+  if (!plane) return std::nullopt;
+  const Eigen::Vector3d first_ray = plane->R_now_first * plane->bearing;
+  const Eigen::Vector3d point_now = first_ray + plane->shift;
 
   Eigen::Matrix<double, 2, 3> d_now_d_point;
   const std::optional<Eigen::Vector2d> pixel = camera.project(point_now, &d_now_d_point);
@@ -99,29 +122,47 @@ std::optional<PatchView> predictPatchView(const SourcePatch& patch, const Camera
 
   PatchView view;
   view.pixel = *pixel;
-  view.parallax_px = d_now_d_point * shift;
-  view.tangent_metric_px2 = (d_bearing_d_first.transpose() * d_bearing_d_first).inverse();
-  view.affine = d_now_d_point * R_now_first * d_bearing_d_first +
+  view.parallax_px = d_now_d_point * plane->shift;
+  view.tangent_metric_px2 =
+      (plane->d_bearing_d_first.transpose() * plane->d_bearing_d_first).inverse();
+  view.affine = d_now_d_point * plane->R_now_first * plane->d_bearing_d_first +
                 view.parallax_px * patch.slope_per_px.transpose();
-  // Inverted, by Sherman and Morrison: b ~ R^T (b' (1 + m . t) - t (m . b')), m = R n.
-  const Eigen::Vector3d normal_now =
-      R_now_first * (*bearing + d_bearing_d_first * (view.tangent_metric_px2 * patch.slope_per_px));
-  const double facing = 1.0 + normal_now.dot(shift);
-  if (facing > 0.0)
-    view.bend_per_px = secondDerivatives([&](const Eigen::Vector2d& offset) {
-      std::optional<Eigen::Vector2d> source;
-      if (const auto ray = camera.unproject(view.pixel + offset))
-        source = camera.project(R_now_first.transpose() *
-                                (facing * *ray - normal_now.dot(*ray) * shift));
-      if (source) *source -= patch.pixel;
-      return source;
-    });
-  if (!view.pixel.allFinite() || !view.affine.allFinite() || !view.bend_per_px.allFinite() ||
-      !view.tangent_metric_px2.allFinite())
+  if (!view.pixel.allFinite() || !view.affine.allFinite() || !view.tangent_metric_px2.allFinite())
     return std::nullopt;
   view.scale = std::sqrt(std::abs(view.affine.determinant()));
-  const Eigen::Vector3d first_ray = R_now_first * *bearing;
   view.view_angle_rad = std::atan2(first_ray.cross(point_now).norm(), first_ray.dot(point_now));
+  return view;
+}
+
+bool bendView(const SourcePatch& patch, const CameraModel& camera,
+              const Eigen::Isometry3d& T_world_camera_now,
+              const Eigen::Vector4d& point_world_homogeneous, PatchView* view) {
+  const auto plane = planeOf(patch, camera, T_world_camera_now, point_world_homogeneous);
+  if (!plane) return false;
+  // The homography inverted, by Sherman and Morrison: b ~ R^T (b' (1 + m . t) - t (m . b')), where
+  // m = R n.
+  const Eigen::Vector3d normal_now =
+      plane->R_now_first *
+      (plane->bearing + plane->d_bearing_d_first * (view->tangent_metric_px2 * patch.slope_per_px));
+  const double facing = 1.0 + normal_now.dot(plane->shift);
+  if (!(facing > 0.0)) return std::isfinite(facing);
+  const Eigen::Matrix3d R_first_now = plane->R_now_first.transpose();
+  view->bend_per_px = secondDerivatives([&](const Eigen::Vector2d& offset) {
+    std::optional<Eigen::Vector2d> source;
+    if (const auto ray = camera.unproject(view->pixel + offset))
+      source = camera.project(R_first_now * (facing * *ray - normal_now.dot(*ray) * plane->shift));
+    if (source) *source -= patch.pixel;
+    return source;
+  });
+  return view->bend_per_px.allFinite();
+}
+
+std::optional<PatchView> predictPatchView(const SourcePatch& patch, const CameraModel& camera,
+                                          const Eigen::Isometry3d& T_world_camera_now,
+                                          const Eigen::Vector4d& point_world_homogeneous) {
+  auto view = predictFlatView(patch, camera, T_world_camera_now, point_world_homogeneous);
+  if (view && !bendView(patch, camera, T_world_camera_now, point_world_homogeneous, &*view))
+    return std::nullopt;
   return view;
 }
 

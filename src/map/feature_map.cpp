@@ -73,7 +73,7 @@ std::vector<VisibleFeature> FeatureMap::visible(const Ekf& filter, const CameraM
     const FeatureState* state = filter.find(feature.id);
     if (!state) continue;
     const auto view =
-        predictPatchView(feature.patch, camera, T_world_camera, homogeneousPosition(*state));
+        predictFlatView(feature.patch, camera, T_world_camera, homogeneousPosition(*state));
     if (!view || !camera.isInImage(view->pixel, border_px)) continue;
     if (view->view_angle_rad > maximum_angle || view->scale < options.minimum_scale ||
         view->scale > options.maximum_scale)

@@ -61,14 +61,17 @@ void Tracker::Implementation::predict(double interval_s) {
 /// Predicts what should be seen and prepares the search for it.
 void Tracker::Implementation::measure(const cv::Mat& image) {
   visible_ = map_.visible(filter_, camera_, options_.map, options_.image.border_px);
-  const auto chosen = map_.choose(visible_, camera_, options_.map.features_per_frame);
+  auto chosen = map_.choose(visible_, camera_, options_.map.features_per_frame);
+  const Eigen::Isometry3d T_world_camera = filter_.camera().poseWorldCamera();
   candidates_.clear();
   templates_.clear();
   std::vector<FeatureId> ids;
-  for (const VisibleFeature& feature : chosen) {
+  for (VisibleFeature& feature : chosen) {
+    const SourcePatch& patch = map_.find(feature.id)->patch;
     Template expected;
-    if (!warpTemplate(map_.find(feature.id)->patch, feature.view, options_.image.template_size_px,
-                      &expected) ||
+    if (!bendView(patch, camera_, T_world_camera, homogeneousPosition(*filter_.find(feature.id)),
+                  &feature.view) ||
+        !warpTemplate(patch, feature.view, options_.image.template_size_px, &expected) ||
         expected.contrast() < options_.image.minimum_contrast)
       continue;
     candidates_.push_back(feature);

@@ -42,6 +42,16 @@ std::optional<PatchView> predictPatchView(const SourcePatch& patch, const Camera
                                           const Eigen::Isometry3d& T_world_camera_now,
                                           const Eigen::Vector4d& point_world_homogeneous);
 
+/// The same but for the bend, which is most of the work and which only templates need.
+std::optional<PatchView> predictFlatView(const SourcePatch& patch, const CameraModel& camera,
+                                         const Eigen::Isometry3d& T_world_camera_now,
+                                         const Eigen::Vector4d& point_world_homogeneous);
+
+/// Bends a flat view of the same patch, camera and point. False when that is not finite.
+bool bendView(const SourcePatch& patch, const CameraModel& camera,
+              const Eigen::Isometry3d& T_world_camera_now,
+              const Eigen::Vector4d& point_world_homogeneous, PatchView* view);
+
 /// Takes an offset from the feature in the present image to that in the first one [px].
 class SourceOffset {
  public:
@@ -59,9 +69,9 @@ class SourceOffset {
   Eigen::Matrix<double, 2, 3> bend_;
 };
 
-/// Resamples the source patch as `view` expects it (interpolated; averaged where the patch shrinks),
-/// with the feature at the centre of the template's middle pixel. False (and `result` empty) when
-/// the template would reach beyond the stored patch or the view is degenerate.
+/// Resamples the source patch as `view` expects it (interpolated; averaged where the patch
+/// shrinks), with the feature at the centre of the template's middle pixel. False (and `result`
+/// empty) when the template would reach beyond the stored patch or the view is degenerate.
 bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_size_px,
                   Template* result);
 

@@ -67,7 +67,7 @@ class FeatureMap {
       const std::function<Eigen::Isometry3d(std::int64_t, const Eigen::Isometry3d&)>& moved);
 
   /// Features predicted in front of the camera, inside the image less `border_px`, and neither too
-  /// oblique nor too different in size from first sight. Ascending id.
+  /// oblique nor too different in size from first sight, by flat views. Ascending id.
   std::vector<VisibleFeature> visible(const Ekf& filter, const CameraModel& camera,
                                       const MapOptions& options, double border_px) const;
 
