@@ -15,7 +15,7 @@ constexpr std::size_t kLeastMatches = 8;
 constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once there are many
 /// The noise that matches are taken to have, in what updates show. (By NEES over rendered runs, as
 /// are the next.)
-constexpr double kShareOfShown = 0.9;
+constexpr double kShareOfShown = 0.858;
 /// Of the variance of matches, the share that lasts, and the motion of the image and the number of
 /// images after which it is another.
 constexpr double kLastingShare = 0.5;

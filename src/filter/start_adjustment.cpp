@@ -20,13 +20,14 @@ constexpr double kFirstParallaxSigmas = 0.75, kEveryImageUpToPx = 2.0, kLastPara
 constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next, then
 /// Share of the points: where most are as far as each other, the few that are near tell the motion.
 constexpr double kAllButNear = 0.75;
-constexpr std::size_t kMostImages = 40;     ///< kept
+constexpr std::size_t kMostImages = 28;     ///< kept
 constexpr std::size_t kParallaxImages = 6;  ///< that it is measured to
 constexpr std::size_t kLeastPoints = 8;  ///< of an image that takes part, and common to the first
 constexpr int kLeastSightings = 3;       ///< of a feature that takes part
 constexpr std::size_t kManyImages = 20;  ///< beyond which an adjustment takes an image more
-constexpr double kRoughGain = 1e-2;      ///< of an adjustment that another one follows
-constexpr int kStepsForOneMore = 2;      ///< once all but the last image are adjusted
+/// Of an adjustment that another one follows: of some images, and of all.
+constexpr double kRoughGain = 1e-2, kGainOnTheWay = 3e-3;
+constexpr int kStepsForOneMore = 2;  ///< once all but the last image are adjusted
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
@@ -296,7 +297,9 @@ std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const Cam
   chooseUnit(options, &chosen.bundle);  // a known scale may have been set
   for (const Image& image : images_) chosen.images.push_back(image.index);
   if (is_settled_) {
-    const double cost = adjustBundle(model, withDepthsOf(chosen.bundle, options), &chosen.bundle);
+    BundleOptions settled = withDepthsOf(chosen.bundle, options);
+    if (images_.size() > kManyImages) settled.least_gain = kGainOnTheWay;
+    const double cost = adjustBundle(model, settled, &chosen.bundle);
     if (costsTooMuch(cost, chosen.bundle)) return std::nullopt;
     chosen.adjusted = Adjusted::kAllImages;
     return chosen;
@@ -354,7 +357,11 @@ std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel
     roughly.least_gain = kRoughGain;
     adjustBundle(model, roughly, &reading.bundle);
   }
-  if (chosen.adjusted == Adjusted::kAllByTheirNoise) all.options.max_iterations = kStepsForOneMore;
+  if (chosen.adjusted == Adjusted::kAllByTheirNoise) {
+    all.options.max_iterations = kStepsForOneMore;
+  } else if (images_.size() > kManyImages) {
+    all.options.least_gain = kGainOnTheWay;
+  }
   adjustByItsNoise(model, &all.options, &reading.bundle, &all.believed, &reading.ids);
   return all;
 }

@@ -376,7 +376,7 @@ TEST(StartAdjustment, TheUnitOfTheDepthsStays) {
 }
 
 TEST(StartAdjustment, GoesInStepsAndTakesInTheImageOfTheLast) {
-  for (const auto& [images, steps] : {std::pair{12, 2}, std::pair{32, 3}}) {
+  for (const auto& [images, steps] : {std::pair{12, 2}, std::pair{26, 3}}) {
     const Bundle truth = track(images, 0.003, 9);
     StartOfATrack start(truth);
     start.show(images - steps);
