@@ -17,7 +17,7 @@ constexpr double kDepthSpread = 3.5;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.12;
 /// What an adjustment takes for the noise of image points, by what they show (by NEES over rendered
 /// runs), and at least.
-constexpr double kShareOfNoise = 0.78, kLeastNoisePx = 0.005;
+constexpr double kShareOfNoise = 0.762, kLeastNoisePx = 0.005;
 /// Images that neighbours are as good as, when they are few: they are off in the same way.
 constexpr double kSameImages = 6.0;
 /// A camera that moves fast blurs, and what points are off by that does not average: from so many
