@@ -1,5 +1,6 @@
 #include "active_matching_slam/camera/camera_calibration.h"
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <sstream>
@@ -123,6 +124,11 @@ CameraCalibration cropAndBin(const CameraCalibration& full, int roi_x, int roi_y
   delivered.cx = (full.cx - roi_x) / binning_x;
   delivered.cy = (full.cy - roi_y) / binning_y;
   return delivered;
+}
+
+bool hasDistortion(const CameraCalibration& calibration) {
+  return std::any_of(calibration.distortion.begin(), calibration.distortion.end(),
+                     [](double coefficient) { return coefficient != 0.0; });
 }
 
 bool sameImaging(const CameraCalibration& a, const CameraCalibration& b) {

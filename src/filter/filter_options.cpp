@@ -32,6 +32,14 @@ CalibrationVector calibrationSigmas(const FilterOptions& options) {
   return sigmas;
 }
 
+FilterOptions withTrustIn(const CameraCalibration& calibration, FilterOptions options) {
+  if (hasDistortion(calibration)) return options;
+  for (double* sigma :
+       {&options.initial_sigma_focal, &options.initial_sigma_radial, &options.initial_sigma_centre})
+    *sigma *= options.uncalibrated_factor;
+  return options;
+}
+
 void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("sigma_acceleration_mps2", options.sigma_acceleration_mps2);
   checkNotNegative("sigma_angular_acceleration_rps2", options.sigma_angular_acceleration_rps2);
@@ -45,6 +53,7 @@ void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("initial_sigma_focal", options.initial_sigma_focal);
   checkNotNegative("initial_sigma_radial", options.initial_sigma_radial);
   checkNotNegative("initial_sigma_centre", options.initial_sigma_centre);
+  checkPositive("uncalibrated_factor", options.uncalibrated_factor);
   check(options.calibration_share > 0.0 && options.calibration_share <= 1.0, "calibration_share",
         options.calibration_share, "(0, 1]");
   checkPositive("initial_inverse_depth", options.initial_inverse_depth);

@@ -16,9 +16,7 @@ constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once t
 /// The noise that matches are taken to have, in what updates show. (By NEES over rendered runs, as
 /// are the next.)
 constexpr double kShareOfShown = 0.858;
-/// Of the variance of matches, the share that lasts, and the motion of the image and the number of
-/// images after which it is another.
-constexpr double kLastingShare = 0.5;
+/// Motion of the image and number of images after which what lasts of the errors is another.
 constexpr double kFreshPx = 50.0;
 constexpr double kMostSameImages = 15.0;
 /// Power of what images tell by which corners wander more. (By the same.)
@@ -32,6 +30,15 @@ constexpr double kLikeOthers = 20.0;  ///< matches for which a feature is taken 
 constexpr double kMostSigmas = 10.0;  ///< that one match says
 
 }  // namespace
+
+double sameImages(double motion_px) {
+  return std::clamp(kFreshPx / motion_px, 1.0, kMostSameImages);
+}
+
+double persistence(double motion_px) {
+  const double images = std::max(kFreshPx / motion_px, 1.0);
+  return (images - 1.0) / (images + 1.0);
+}
 
 double MatchNoise::learn(const std::vector<Eigen::Vector2d>& residuals_px) {
   std::vector<double> sizes_px;
@@ -51,7 +58,7 @@ void MatchNoise::seeMotion(std::vector<double> motions_px) {
   const double motion_px = motions_px.size() < kLeastMatches
                                ? std::numeric_limits<double>::infinity()
                                : medianOf(std::move(motions_px));
-  same_images_ = std::clamp(kFreshPx / motion_px, 1.0, kMostSameImages);
+  same_images_ = sameImages(motion_px);
 }
 
 void MatchNoise::see(std::vector<double> sigmas_px) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "active_matching_slam/filter/match_motion.h"
+#include "active_matching_slam/filter/match_noise.h"
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/quantile.h"
 #include "adjusted_start.h"
@@ -155,6 +156,8 @@ void StartAdjustment::add(std::int64_t index, double interval_s, const Ekf& filt
     Eigen::Vector2d& speed = before.speeds[same - before.measurements.data()];
     speed = speed.isZero(0.0) ? image.speeds[i] : Eigen::Vector2d(0.5 * (speed + image.speeds[i]));
   }
+  std::vector<double> motions_px = matchMotions(before.measurements, measurements);
+  if (!motions_px.empty()) image.persistence = persistence(medianOf(std::move(motions_px)));
   images_.push_back(std::move(image));
   thinOut();
 }
@@ -184,13 +187,19 @@ void StartAdjustment::thinOut() {
   if (n >= 4 && (images_[n - 3].measurements.size() < kLeastPoints ||
                  quantileOf(matchMotions(images_[n - 4].measurements, images_[n - 3].measurements),
                             kAllButNear) < least_motion_px_)) {
+    images_[n - 2].persistence *= images_[n - 3].persistence;
     images_.erase(images_.end() - 3);
   }
   if (images_.size() <= kMostImages) return;
   least_motion_px_ *= 2.0;
   std::vector<Image> kept;
-  for (std::size_t i = 0; i < images_.size(); ++i)
-    if (i % 2 == 0 || i + 2 >= images_.size()) kept.push_back(std::move(images_[i]));
+  double since_kept = 1.0;  // persistence
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    images_[i].persistence *= since_kept;
+    const bool stays = i % 2 == 0 || i + 2 >= images_.size();
+    since_kept = stays ? 1.0 : images_[i].persistence;
+    if (stays) kept.push_back(std::move(images_[i]));
+  }
   images_ = std::move(kept);
 }
 
@@ -245,6 +254,7 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
   const std::vector<double> of_features = noiseOfFeatures(*ids);
   for (std::size_t k = 0; k < images_.size(); ++k) {
     const Image& image = images_[k];
+    bundle.persistence.push_back(image.persistence);
     bundle.cameras.push_back(image.camera);
     bundle.observations.emplace_back();
     for (std::size_t i = 0; i < image.measurements.size(); ++i) {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "active_matching_slam/filter/match_motion.h"
+#include "active_matching_slam/filter/match_noise.h"
 #include "active_matching_slam/filter/quantile.h"
 #include "start_readings.h"
 
@@ -17,13 +17,7 @@ constexpr double kDepthSpread = 3.5;
 constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.12;
 /// What an adjustment takes for the noise of image points, by what they show (by NEES over rendered
 /// runs), and at least.
-constexpr double kShareOfNoise = 0.762, kLeastNoisePx = 0.005;
-/// Images that neighbours are as good as, when they are few: they are off in the same way.
-constexpr double kSameImages = 6.0;
-/// A camera that moves fast blurs, and what points are off by that does not average: from so many
-/// pixels between its last images on the variance grows, over as many more, by so much at most.
-constexpr double kFastPx = 4.0, kMoreWhenFast = 0.8;
-constexpr std::size_t kLastImages = 5;
+constexpr double kShareOfNoise = 1.1, kLeastNoisePx = 0.005;
 /// No image point counts for more than so many times what features miss on the whole (median).
 constexpr double kMostMiss = 3.0;
 /// Points for which an image is taken to be as noisy as most.
@@ -63,23 +57,6 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
   }
 }
 
-/// Median motion of the image [px] from one of the last images to the next.
-double lastMotion(const Bundle& bundle) {
-  const auto matches = [&bundle](std::size_t image) {
-    std::vector<FeatureMeasurement> matches;
-    for (const BundleObservation& o : bundle.observations[image])
-      matches.push_back({o.feature, o.pixel, 0.0});
-    return matches;
-  };
-  const std::size_t images = bundle.observations.size();
-  std::vector<double> motions_px;
-  for (std::size_t k = images - std::min(kLastImages, images - 1); k < images; ++k) {
-    std::vector<double> of_image_px = matchMotions(matches(k - 1), matches(k));
-    if (!of_image_px.empty()) motions_px.push_back(medianOf(std::move(of_image_px)));
-  }
-  return medianOf(std::move(motions_px));
-}
-
 /// Image points are as noisy, in that of most images, as what those of their image miss shows: of
 /// one that is blurred all are worse (variance components; Foerstner 1979). The first image, from
 /// which all is told, counts as most do.
@@ -103,6 +80,7 @@ BundleOptions startOptions(const FilterOptions& filter) {
   BundleOptions options;
   options.outlier_px = kOutlierSigmas * filter.sigma_px;
   options.sigma_px = filter.sigma_px;
+  options.lasting_share = kLastingShare;
   options.inverse_depth = filter.initial_inverse_depth;
   options.sigma_inverse_depth = filter.initial_sigma_inverse_depth;
   options.minimum_inverse_depth = filter.minimum_inverse_depth;
@@ -125,12 +103,8 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
   // most image points are much better than that.
   options->outlier_px =
       std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
-  const double images = static_cast<double>(reading->cameras.size());
-  const double variance_by_blur =
-      1.0 + kMoreWhenFast * std::clamp(lastMotion(*reading) / kFastPx - 1.0, 0.0, 1.0);
-  const double shown_px =
-      kShareOfNoise * noise_px * (1.0 + kSameImages / (images - 2.0)) * std::sqrt(variance_by_blur);
-  options->sigma_px = std::min(options->sigma_px, std::max(shown_px, kLeastNoisePx));
+  options->sigma_px =
+      std::min(options->sigma_px, std::max(kShareOfNoise * noise_px, kLeastNoisePx));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);
 }

@@ -51,7 +51,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
         "image/template_size_px and image/source_patch_size_px can't change "
         "while a map is kept");
   if (options.matcher != options_.matcher) matcher_ = createMatcher(options.matcher);
-  filter_.setOptions(options.filter);
+  filter_.setOptions(withTrustIn(camera_.calibration(), options.filter));
   relocaliser_ = Relocaliser({}, options.map, options.image);
   search_ = ImageFeatureSearch(options.image);
   second_search_ = ImageFeatureSearch(options.image);

@@ -27,7 +27,7 @@ class Tracker::Implementation {
   Implementation(const CameraModel& camera, const TrackerOptions& options)
       : camera_(camera),
         options_(options),
-        filter_(options.filter),
+        filter_(withTrustIn(camera.calibration(), options.filter)),
         search_(options.image),
         second_search_(options.image),
         relocaliser_({}, options.map, options.image),

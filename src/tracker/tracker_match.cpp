@@ -242,6 +242,7 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
 /// Learns from what the matches fused miss of the map as it is now how noisy they are. Where the
 /// state has followed nearly all of a match, what is left tells nothing.
 void Tracker::Implementation::learnNoise(const UpdateReport& report) {
+  if (start_adjustment_.areDepthsGuessed()) return;
   const Eigen::Vector2d unknown =
       Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<Eigen::Vector2d> residuals_px;

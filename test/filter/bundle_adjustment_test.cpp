@@ -2,10 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "filter/example_bundle.h"
 
@@ -78,93 +76,6 @@ TEST(BundleAdjustment, StopsWhereNoParameterCanLowerTheCost) {
   for (std::size_t i = 0; i < bundle.features.size(); ++i)
     for (const double sign : {-1.0, 1.0})
       EXPECT_GT(rise([&](Bundle& b) { b.features[i].inverse_depth += sign * 0.02; }), 0.0) << i;
-}
-
-TEST(BundleAdjustment, CovarianceIsThatOfThePlainFormula) {
-  const CameraModel model(exampleCalibration());
-  BundleOptions options = weakPrior();
-  options.sigma_px = 0.45;
-  options.outlier_px = 1e6;
-  options.sigma_calibration << 0.01, 0.01, 0.01, 0.1, 0.1;
-  Bundle bundle = exampleBundle(model, 4, 12, 0.1, 0.0, 3);
-  Random random(3);
-  for (auto& observations : bundle.observations) {
-    for (BundleObservation& o : observations) {
-      o.d_calibration.col(0) = Eigen::Vector2d(random.normal(100.0), random.normal(100.0));
-      o.d_calibration.rightCols<4>() = model.pixelByCorrection(o.pixel);
-    }
-  }
-  const int cameras = 3, features = 12, calibration = 6 * cameras,
-            first_feature = calibration + CameraError::kCalibrationSize,
-            size = first_feature + 3 * features;
-  const auto moved = [&](int parameter, double step) {
-    Bundle b = bundle;
-    if (parameter >= calibration && parameter < first_feature) {
-      b.calibration[parameter - calibration] += step;
-      return b;
-    }
-    if (parameter < calibration) {
-      CameraState& camera = b.cameras[1 + parameter / 6];
-      const Eigen::Vector3d d = step * Eigen::Vector3d::Unit(parameter % 3);
-      if (parameter % 6 < 3) {
-        camera.position_world += d;
-      } else {
-        camera.q_world_camera = rotationFromVector(d) * camera.q_world_camera;
-      }
-      return b;
-    }
-    FeatureState& f = b.features[(parameter - first_feature) / 3];
-    const int which = (parameter - first_feature) % 3;
-    if (which == 2) {
-      f.inverse_depth += step;
-    } else {
-      f.bearing_world = (f.bearing_world + step * f.tangentBasis().col(which)).normalized();
-    }
-    return b;
-  };
-  const auto pixels = [&](const Bundle& b) {
-    std::vector<double> values;
-    for (std::size_t k = 0; k < b.cameras.size(); ++k)
-      for (const BundleObservation& o : bundle.observations[k]) {
-        const Eigen::Vector2d z =
-            projectFeature(model, b.cameras[k], b.features[o.feature])->pixel +
-            o.d_calibration * b.calibration;
-        values.insert(values.end(), {z.x(), z.y()});
-      }
-    return Eigen::VectorXd(Eigen::Map<Eigen::VectorXd>(values.data(), values.size()));
-  };
-  Eigen::MatrixXd J(pixels(bundle).size(), size);
-  for (int p = 0; p < size; ++p)
-    J.col(p) = (pixels(moved(p, 1e-6)) - pixels(moved(p, -1e-6))) / 2e-6;
-  Eigen::MatrixXd information = J.transpose() * J / (options.sigma_px * options.sigma_px);
-  information.diagonal().segment<CameraError::kCalibrationSize>(calibration) +=
-      options.sigma_calibration.array().square().inverse().matrix();
-  const double scale_sigma = 0.01;
-  for (int i = 0; i < features; ++i) {
-    const int row = first_feature + 3 * i + 2;
-    information(row, row) += 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
-  }
-  Eigen::VectorXd depths = Eigen::VectorXd::Zero(size);
-  for (int i = 0; i < features; ++i)
-    depths[first_feature + 3 * i + 2] = 1.0 / (features * bundle.features[i].inverse_depth);
-  // The lens stays as doubtful as it was and makes the rest so: what images tell of it is left out.
-  std::vector<int> order(size);
-  std::iota(order.begin(), order.end(), 0);
-  std::rotate(order.begin() + calibration + 1, order.begin() + first_feature, order.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic> lens_last(
-      Eigen::Map<Eigen::VectorXi>(order.data(), size));
-  Eigen::MatrixXd I = lens_last.transpose() * information * lens_last;
-  const Eigen::MatrixXd cross = I.bottomLeftCorner(4, size - 4);
-  I.bottomRightCorner<4, 4>() =
-      cross * I.topLeftCorner(size - 4, size - 4).inverse() * cross.transpose();
-  I.diagonal().tail<4>() += options.sigma_calibration.tail<4>().array().square().inverse().matrix();
-  information = lens_last * I * lens_last.transpose();
-  const Eigen::MatrixXd plain =
-      (information + depths * depths.transpose() / (scale_sigma * scale_sigma)).inverse();
-  const Eigen::MatrixXd covariance = bundleCovariance(model, options, bundle, 2, scale_sigma);
-  const int kept = size - 6;
-  ASSERT_EQ(covariance.rows(), kept);
-  EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
 }
 
 TEST(BundleAdjustment, NoOtherUnitFitsThePriorOfDepthsBetter) {

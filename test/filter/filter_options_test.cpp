@@ -38,6 +38,7 @@ const DoubleOption kOptions[] = {
     {"initial_sigma_focal", &FilterOptions::initial_sigma_focal, true},
     {"initial_sigma_radial", &FilterOptions::initial_sigma_radial, true},
     {"initial_sigma_centre", &FilterOptions::initial_sigma_centre, true},
+    {"uncalibrated_factor", &FilterOptions::uncalibrated_factor, false},
     {"calibration_share", &FilterOptions::calibration_share, false},
     {"initial_inverse_depth", &FilterOptions::initial_inverse_depth, false},
     {"initial_sigma_inverse_depth", &FilterOptions::initial_sigma_inverse_depth, false},
@@ -63,6 +64,21 @@ TEST(FilterOptions, EveryValueOutOfRangeIsRefusedByName) {
     FilterOptions options;
     options.update_iterations = bad;
     EXPECT_NE(faultOf(options).find("update_iterations"), std::string::npos);
+  }
+}
+
+TEST(FilterOptions, ALensThatNobodyCalibratedIsTrustedLess) {
+  FilterOptions options;
+  options.uncalibrated_factor = 3.0;
+  CameraCalibration calibration;
+  calibration.distortion_model = DistortionModel::kPlumbBob;
+  calibration.distortion = {0.0, 0.0, 0.0, 1e-4, 0.0};
+  EXPECT_EQ(calibrationSigmas(withTrustIn(calibration, options)), calibrationSigmas(options));
+  CalibrationVector expected = calibrationSigmas(options);
+  expected.tail<4>() *= 3.0;  // not the readout
+  for (const std::vector<double>& none : {std::vector<double>{}, std::vector<double>(5, 0.0)}) {
+    calibration.distortion = none;
+    EXPECT_TRUE(calibrationSigmas(withTrustIn(calibration, options)).isApprox(expected));
   }
 }
 

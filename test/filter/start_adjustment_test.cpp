@@ -267,36 +267,6 @@ TEST(StartAdjustment, ABlurredImageCountsForLess) {
   EXPECT_LT(with, 1.2 * without);
 }
 
-/// Median over the features, in their distance.
-double depthSigma(const AdjustedStart& adjusted) {
-  std::vector<double> sigmas;
-  for (const FeatureState& feature : adjusted.features) {
-    const int row = feature.inverseDepthRow();
-    sigmas.push_back(std::sqrt(adjusted.covariance(row, row)) / feature.inverse_depth);
-  }
-  return medianOf(std::move(sigmas));
-}
-
-TEST(StartAdjustment, ACameraThatWasFastIsBelievedLess) {
-  // The same images, of which the last come in an order that makes the camera fast.
-  constexpr int kLast = 15;
-  const Bundle slow =
-      exampleBundle(CameraModel(exampleCalibration()), kLast + 1, 40, 0.006, 0.2, 1);
-  Bundle fast = slow;
-  for (int k = 6; k < kLast; ++k) {
-    const int image = k % 2 == 0 ? 3 + k / 2 : kLast - k / 2 + 2;
-    fast.cameras[k] = slow.cameras[image];
-    fast.observations[k] = slow.observations[image];
-  }
-  StartOfATrack slow_start(slow), fast_start(fast);
-  const auto of_slow = slow_start.adjustAfter(kLast), of_fast = fast_start.adjustAfter(kLast);
-  ASSERT_TRUE(of_slow && of_fast);
-  std::printf("depths are known to %.5f, %.5f by a fast camera\n", depthSigma(*of_slow),
-              depthSigma(*of_fast));
-  EXPECT_GT(depthSigma(*of_fast), 1.1 * depthSigma(*of_slow));
-  EXPECT_LT(depthSigma(*of_fast), 1.5 * depthSigma(*of_slow));
-}
-
 TEST(StartAdjustment, AScaleThatIsSetMeanwhileHoldsForEarlierImagesToo) {
   const Bundle truth = track(12, 0.02, 6);
   StartOfATrack start(truth);

@@ -25,6 +25,10 @@ struct CameraCalibration {
 /// A zero focal length is named as what it means in camera_info: an uncalibrated camera.
 void checkCalibration(const CameraCalibration& calibration);
 
+/// Whether any coefficient of distortion is not zero. A real lens of which none is was not
+/// calibrated, but taken for what it is sold as.
+bool hasDistortion(const CameraCalibration& calibration);
+
 /// True when both take the same pictures: all but their names agree.
 bool sameImaging(const CameraCalibration& a, const CameraCalibration& b);
 

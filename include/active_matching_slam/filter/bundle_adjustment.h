@@ -28,6 +28,9 @@ struct Bundle {
   std::vector<FeatureState> features;
   std::vector<std::vector<BundleObservation>> observations;  ///< one list a camera
   CalibrationVector calibration = CalibrationVector::Zero();
+  /// Of each image: correlation of errors that last with those in the image before. One an image
+  /// where BundleOptions::lasting_share is not 0.
+  std::vector<double> persistence;
 };
 
 struct BundleOptions {
@@ -37,6 +40,9 @@ struct BundleOptions {
   double sigma_inverse_depth = 0.5;  ///< and its standard deviation
   double minimum_inverse_depth = 1e-4;
   CalibrationVector sigma_calibration = CalibrationVector::Zero();  ///< prior, about zero
+  /// Of the variance of image points, the share that lasts from image to image
+  /// (Bundle::persistence) once a feature has been seen again: for bundleCovariance().
+  double lasting_share = 0.0;
   int max_iterations = 20;
   double least_gain = 1e-4;  ///< relative fall of the cost that is worth a step more
   /// Ends where steps like the last, as many as are left, would not bring the cost below.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "active_matching_slam/camera/camera_calibration.h"
 #include "active_matching_slam/filter/camera_state.h"
 
 namespace active_matching_slam {
@@ -24,6 +25,8 @@ struct FilterOptions {
   double initial_sigma_focal = 0.0004;  ///< these: see LensCorrection
   double initial_sigma_radial = 0.002;
   double initial_sigma_centre = 0.00025;
+  /// The lens's three are so many times as large where no distortion was calibrated.
+  double uncalibrated_factor = 5.0;
   /// Of each correction of the calibration, how much is made: 1 where errors of matches are white;
   /// those of images last, and teach less than so many of them should. See Ekf::update().
   double calibration_share = 0.6;
@@ -37,6 +40,9 @@ struct FilterOptions {
 
 /// Of the prior, in the order of CameraError from kReadout on.
 CalibrationVector calibrationSigmas(const FilterOptions& options);
+
+/// The options for a camera, by whether its lens was calibrated (hasDistortion()).
+FilterOptions withTrustIn(const CameraCalibration& calibration, FilterOptions options);
 
 /// Throws std::invalid_argument with name, value and allowed range.
 void checkFilterOptions(const FilterOptions& options);

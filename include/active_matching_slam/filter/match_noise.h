@@ -7,6 +7,17 @@
 
 namespace active_matching_slam {
 
+/// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
+constexpr double kLastingShare = 0.5;
+
+/// Images over which what lasts is the same, for matches that move by so much from one to the next
+/// [px]: the sum of its correlations with that of all images.
+double sameImages(double motion_px);
+
+/// Correlation of what lasts with that in the image before, if it falls by the same factor from
+/// each image to the next.
+double persistence(double motion_px);
+
 /// How much more or less noisy the matches of one feature are than most: some corners are cleaner
 /// than others, and where something near hides something far there is no point to be found. By what
 /// is left between image and template, and by what updates leave over about the last hundred

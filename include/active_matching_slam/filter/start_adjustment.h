@@ -43,6 +43,8 @@ class StartAdjustment {
   void begin(std::int64_t index, const std::vector<FeatureMeasurement>& first);
   void end() { is_active_ = false; }
   bool isActive() const { return is_active_; }
+  /// While nothing has been adjusted yet: the depths are a guess.
+  bool areDepthsGuessed() const { return is_active_ && last_parallax_px_ == 0.0; }
   /// While all that is seen has been seen from about the same place.
   bool areDepthsVague() const { return is_active_ && !has_left_first_; }
 
@@ -70,7 +72,8 @@ class StartAdjustment {
     std::vector<FeatureMeasurement> measurements;  ///< ascending id
     /// Speed [px/s] of each of them, by the images next to this one that show it; zero: none does.
     std::vector<Eigen::Vector2d> speeds;
-    double sigma_px = 0.0;  ///< of most of them; 0: unknown
+    double sigma_px = 0.0;     ///< of most of them; 0: unknown
+    double persistence = 0.0;  ///< see Bundle
   };
 
   enum class Adjusted { kSomeImages, kAllImages, kAllByTheirNoise };

@@ -87,6 +87,10 @@ void visitOptions(Options& o, Visitor&& visit) {
           "trust in the calibration: of the image centre, per axis, relative to the focal length",
           true},
         o.filter.initial_sigma_centre, 0.0, 0.2);
+  visit(F{"filter/uncalibrated_factor",
+          "of the three before this, where camera_info has no distortion; 1 for rectified images",
+          true},
+        o.filter.uncalibrated_factor, 1.0, 100.0);
   visit(F{"filter/calibration_share",
           "of each correction of the calibration, how much is made; less than 1 since errors last",
           true},

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "active_matching_slam/filter/bundle_adjustment.h"
+#include "active_matching_slam/filter/state_error.h"
+
+namespace active_matching_slam {
+
+constexpr int kCalibrationSize = CameraError::kCalibrationSize;
+constexpr int kLensSize = kCalibrationSize - 1;  ///< all but the readout
+using LensVector = Eigen::Matrix<double, kLensSize, 1>;
+
+/// Cost of an image point whose feature does not project.
+constexpr double kCostOfInvisible = 1e3;
+
+/// Least squares over (cameras but the first, 6 each, and the calibration; features, 3 each) about
+/// the present state. C = 6K + kCalibrationSize.
+struct NormalEquations {
+  double cost = 0.0;
+  Eigen::MatrixXd cameras;                ///< C x C, lower triangle
+  Eigen::VectorXd camera_gradient;        ///< C
+  std::vector<Eigen::Matrix3d> features;  ///< F blocks
+  Eigen::VectorXd feature_gradient;       ///< 3F
+  Eigen::MatrixXd cross;                  ///< C x 3F
+};
+
+NormalEquations linearise(const CameraModel& model, const BundleOptions& options,
+                          const Bundle& bundle);
+
+/// Of the root of the information that image points give, what lasts from image to image: the
+/// covariance of the gradient that it makes, less what it would be if it were white. C without the
+/// lens, which is not learnt. See BundleOptions::lasting_share.
+NormalEquations lastingExcess(const CameraModel& model, const BundleOptions& options,
+                              const Bundle& bundle);
+
+/// The normal equations of the cameras alone, once the features are eliminated.
+struct CameraEquations {
+  Eigen::LLT<Eigen::MatrixXd> factor;          ///< C x C
+  Eigen::MatrixXd cross;                       ///< W L^-T, where H = L L^T is a feature's block
+  std::vector<Eigen::Matrix3d> inverse_roots;  ///< L^-1 of each feature
+};
+
+/// With the diagonal grown by `damping`. Empty when not positive definite. Given
+/// `lens_information`, that is all that is known of the lens once the rest is eliminated.
+std::optional<CameraEquations> eliminateFeatures(const NormalEquations& N, double damping,
+                                                 const LensVector* lens_information = nullptr);
+
+/// Inverse variances of the prior.
+CalibrationVector calibrationInformation(const BundleOptions& options);
+
+/// Of the inverse depths by their prior.
+double depthCost(const BundleOptions& options, const Bundle& bundle);
+
+/// Cauchy's function of a squared miss [px^2], in units of the noise: what is far off counts ever
+/// less.
+double robustCost(const BundleOptions& options, double squared);
+
+/// Where a point would be seen by the calibration as given.
+inline Eigen::Vector2d plainPixel(const Bundle& bundle, const BundleObservation& o) {
+  return o.pixel - o.d_calibration * bundle.calibration;
+}
+
+/// Of a residual [px], squared, as if the point were as noisy as most.
+inline double squaredMiss(const BundleObservation& o, const Eigen::Vector2d& residual_px) {
+  return residual_px.squaredNorm() / (o.noise * o.noise);
+}
+
+/// Calls visit(image, observation, squaredMiss) for all image points; infinite where the feature
+/// does not project.
+template <typename Visit>
+void forEachMiss(const CameraModel& model, const Bundle& bundle, const Visit& visit) {
+  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
+    const CameraState& camera = bundle.cameras[k];
+    const Eigen::Matrix3d R_camera_world = camera.q_world_camera.toRotationMatrix().transpose();
+    for (const BundleObservation& o : bundle.observations[k]) {
+      const FeatureState& feature = bundle.features[o.feature];
+      const auto pixel = model.project(
+          R_camera_world * (feature.bearing_world - feature.inverse_depth * camera.position_world));
+      visit(k, o,
+            pixel ? squaredMiss(o, plainPixel(bundle, o) - *pixel)
+                  : std::numeric_limits<double>::infinity());
+    }
+  }
+}
+
+}  // namespace active_matching_slam
