@@ -4,28 +4,28 @@
 namespace active_matching_slam {
 namespace {
 
-/// Adds to the covariance what lasting errors do to the estimate beyond white ones, where E is what
-/// they do to the gradient: A^-1 E A^-1 (White's sandwich), A the information. M as below.
-void addLastingErrors(const NormalEquations& excess, const CameraEquations& reduced,
+/// Adds to the covariance what lasting errors do to the estimate beyond white ones: A^-1 E A^-1
+/// (White's sandwich), with the information A and the `excess` E. `inverse_root` and `M` as below.
+void addLastingErrors(const BundleMatrix& excess, const CameraEquations& reduced,
                       const Eigen::MatrixXd& inverse_root, const Eigen::MatrixXd& M, int kept,
                       Eigen::MatrixXd* covariance) {
   const Eigen::Index C = excess.cameras.rows();  // without the lens, which comes last
   const auto W = reduced.cross.topRows(C);
-  // Once the features are eliminated: of the cameras E, and with the features' own U.
-  Eigen::MatrixXd U(C, W.cols()), half(C, W.cols());
   const int F = static_cast<int>(excess.features.size());
+  // Once the features are eliminated, the cameras' excess is E - Z W^T - W Z^T, and that with the
+  // features' own U.
+  Eigen::MatrixXd Z(C, W.cols()), U(C, W.cols());
   for (int i = 0; i < F; ++i) {
     const Eigen::Matrix3d& root = reduced.inverse_roots[i];
     const Eigen::Matrix3d own = root * excess.features[i] * root.transpose();
-    const auto Wi = W.middleCols<3>(3 * i);
-    half.middleCols<3>(3 * i).noalias() =
-        excess.cross.middleCols<3>(3 * i).lazyProduct(root.transpose()) - Wi.lazyProduct(0.5 * own);
-    U.middleCols<3>(3 * i).noalias() =
-        (half.middleCols<3>(3 * i) - Wi.lazyProduct(0.5 * own)).lazyProduct(root);
+    const Eigen::Matrix<double, Eigen::Dynamic, 3> half = 0.5 * W.middleCols<3>(3 * i) * own;
+    auto Zi = Z.middleCols<3>(3 * i);
+    Zi.noalias() = excess.cross.middleCols<3>(3 * i).lazyProduct(root.transpose()) - half;
+    U.middleCols<3>(3 * i).noalias() = (Zi - half).lazyProduct(root);
     covariance->block<3, 3>(kept + 3 * i, kept + 3 * i) += root.transpose() * own * root;
   }
   Eigen::MatrixXd E = excess.cameras.selfadjointView<Eigen::Lower>();
-  const Eigen::MatrixXd by_features = half * W.transpose();
+  const Eigen::MatrixXd by_features = Z * W.transpose();
   E -= by_features;
   E -= by_features.transpose();
   const Eigen::MatrixXd T = M.leftCols(C) * inverse_root.topLeftCorner(C, C);

@@ -166,15 +166,15 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
   return N;
 }
 
-NormalEquations lastingExcess(const CameraModel& model, const BundleOptions& options,
-                              const Bundle& bundle) {
+BundleMatrix lastingExcess(const CameraModel& model, const BundleOptions& options,
+                           const Bundle& bundle) {
   const int K = static_cast<int>(bundle.cameras.size()) - 1;
   const int F = static_cast<int>(bundle.features.size());
   const int readout = 6 * K, C = readout + 1;
-  NormalEquations N;
-  N.cameras = Eigen::MatrixXd::Zero(C, C);
-  N.features.assign(F, Eigen::Matrix3d::Zero());
-  N.cross = Eigen::MatrixXd::Zero(C, 3 * F);
+  BundleMatrix excess;
+  excess.cameras = Eigen::MatrixXd::Zero(C, C);
+  excess.features.assign(F, Eigen::Matrix3d::Zero());
+  excess.cross = Eigen::MatrixXd::Zero(C, 3 * F);
   auto points = whitePoints(model, options, bundle);
   for (int i = 0; i < F; ++i) {
     std::vector<WhitePoint>& seen = points[i];
@@ -188,41 +188,41 @@ NormalEquations lastingExcess(const CameraModel& model, const BundleOptions& opt
         const WhitePoint& q = seen[b];
         for (int k = seen[b - 1].image + 1; k <= q.image; ++k) share *= bundle.persistence[k];
         const Matrix26 of_p = share * p.d_pose;
-        N.cameras.block<6, 6>(6 * (q.image - 1), 6 * (p.image - 1)).noalias() +=
+        excess.cameras.block<6, 6>(6 * (q.image - 1), 6 * (p.image - 1)).noalias() +=
             q.d_pose.transpose() * of_p;
         shared[a].add(share, q);
         shared[b].add(share, p);
       }
       const int row = 6 * (p.image - 1);
       const Shared& others = shared[a];
-      N.cameras.block<1, 6>(readout, row) += others.d_readout.transpose() * p.d_pose;
-      N.cameras(readout, readout) += others.d_readout.dot(p.d_readout);
-      N.cross.block<6, 3>(row, 3 * i) = p.d_pose.transpose() * others.d_feature;
-      N.cross.block<1, 3>(readout, 3 * i) += p.d_readout.transpose() * others.d_feature;
-      N.features[i] += p.d_feature.transpose() * others.d_feature;
+      excess.cameras.block<1, 6>(readout, row) += others.d_readout.transpose() * p.d_pose;
+      excess.cameras(readout, readout) += others.d_readout.dot(p.d_readout);
+      excess.cross.block<6, 3>(row, 3 * i) = p.d_pose.transpose() * others.d_feature;
+      excess.cross.block<1, 3>(readout, 3 * i) += p.d_readout.transpose() * others.d_feature;
+      excess.features[i] += p.d_feature.transpose() * others.d_feature;
     }
   }
-  return N;
+  return excess;
 }
 
 /// With the diagonal grown by `damping`. Empty when not positive definite. Given
 /// `lens_information`, that is all that is known of the lens once the rest is eliminated.
-std::optional<CameraEquations> eliminateFeatures(const NormalEquations& N, double damping,
+std::optional<CameraEquations> eliminateFeatures(const BundleMatrix& information, double damping,
                                                  const LensVector* lens_information) {
   CameraEquations reduced;
-  reduced.cross.resize(N.cross.rows(), N.cross.cols());
-  reduced.inverse_roots.reserve(N.features.size());
-  for (std::size_t i = 0; i < N.features.size(); ++i) {
-    Eigen::Matrix3d H = N.features[i];
+  reduced.cross.resize(information.cross.rows(), information.cross.cols());
+  reduced.inverse_roots.reserve(information.features.size());
+  for (std::size_t i = 0; i < information.features.size(); ++i) {
+    Eigen::Matrix3d H = information.features[i];
     H.diagonal() *= 1.0 + damping;
     const Eigen::LLT<Eigen::Matrix3d> root(H);
     if (root.info() != Eigen::Success) return std::nullopt;
     reduced.inverse_roots.push_back(root.matrixL().solve(Eigen::Matrix3d::Identity()));
     const auto column = static_cast<Eigen::Index>(3 * i);
     reduced.cross.middleCols<3>(column).noalias() =
-        N.cross.middleCols<3>(column).lazyProduct(reduced.inverse_roots[i].transpose());
+        information.cross.middleCols<3>(column).lazyProduct(reduced.inverse_roots[i].transpose());
   }
-  Eigen::MatrixXd S = N.cameras;
+  Eigen::MatrixXd S = information.cameras;
   S.diagonal() *= 1.0 + damping;
   S.selfadjointView<Eigen::Lower>().rankUpdate(reduced.cross, -1.0);
   if (lens_information != nullptr) {

@@ -18,25 +18,29 @@ using LensVector = Eigen::Matrix<double, kLensSize, 1>;
 /// Cost of an image point whose feature does not project.
 constexpr double kCostOfInvisible = 1e3;
 
-/// Least squares over (cameras but the first, 6 each, and the calibration; features, 3 each) about
-/// the present state. C = 6K + kCalibrationSize.
-struct NormalEquations {
-  double cost = 0.0;
+/// A symmetric matrix over C numbers of the cameras (but the first, 6 each, and of the calibration)
+/// and 3 of each of F features, of which no two have anything in common.
+struct BundleMatrix {
   Eigen::MatrixXd cameras;                ///< C x C, lower triangle
-  Eigen::VectorXd camera_gradient;        ///< C
   std::vector<Eigen::Matrix3d> features;  ///< F blocks
-  Eigen::VectorXd feature_gradient;       ///< 3F
   Eigen::MatrixXd cross;                  ///< C x 3F
+};
+
+/// Least squares about the present state: the information, with C = 6K + kCalibrationSize.
+struct NormalEquations : BundleMatrix {
+  double cost = 0.0;
+  Eigen::VectorXd camera_gradient;   ///< C
+  Eigen::VectorXd feature_gradient;  ///< 3F
 };
 
 NormalEquations linearise(const CameraModel& model, const BundleOptions& options,
                           const Bundle& bundle);
 
-/// Of the root of the information that image points give, what lasts from image to image: the
-/// covariance of the gradient that it makes, less what it would be if it were white. C without the
-/// lens, which is not learnt. See BundleOptions::lasting_share.
-NormalEquations lastingExcess(const CameraModel& model, const BundleOptions& options,
-                              const Bundle& bundle);
+/// By how much the covariance of the gradient is more than the information, because errors of image
+/// points last from image to image (BundleOptions::lasting_share). C = 6K + 1: the lens, which is
+/// not learnt, is left out.
+BundleMatrix lastingExcess(const CameraModel& model, const BundleOptions& options,
+                           const Bundle& bundle);
 
 /// The normal equations of the cameras alone, once the features are eliminated.
 struct CameraEquations {
@@ -47,7 +51,7 @@ struct CameraEquations {
 
 /// With the diagonal grown by `damping`. Empty when not positive definite. Given
 /// `lens_information`, that is all that is known of the lens once the rest is eliminated.
-std::optional<CameraEquations> eliminateFeatures(const NormalEquations& N, double damping,
+std::optional<CameraEquations> eliminateFeatures(const BundleMatrix& information, double damping,
                                                  const LensVector* lens_information = nullptr);
 
 /// Inverse variances of the prior.

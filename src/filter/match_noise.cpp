@@ -16,7 +16,8 @@ constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once t
 /// The noise that matches are taken to have, in what updates show. (By NEES over rendered runs, as
 /// are the next.)
 constexpr double kShareOfShown = 0.858;
-/// Motion of the image and number of images after which what lasts of the errors is another.
+/// Motion of the image after which what lasts of the errors is another, and the most images that an
+/// update takes for the same.
 constexpr double kFreshPx = 50.0;
 constexpr double kMostSameImages = 15.0;
 /// Power of what images tell by which corners wander more. (By the same.)
@@ -29,14 +30,13 @@ constexpr double kMemory = 0.99;      ///< of a feature's noise, a match
 constexpr double kLikeOthers = 20.0;  ///< matches for which a feature is taken to be like others
 constexpr double kMostSigmas = 10.0;  ///< that one match says
 
+/// Images until what lasts is another, for matches that move by so much from one to the next [px].
+double sameImages(double motion_px) { return std::max(kFreshPx / motion_px, 1.0); }
+
 }  // namespace
 
-double sameImages(double motion_px) {
-  return std::clamp(kFreshPx / motion_px, 1.0, kMostSameImages);
-}
-
 double persistence(double motion_px) {
-  const double images = std::max(kFreshPx / motion_px, 1.0);
+  const double images = sameImages(motion_px);
   return (images - 1.0) / (images + 1.0);
 }
 
@@ -58,7 +58,7 @@ void MatchNoise::seeMotion(std::vector<double> motions_px) {
   const double motion_px = motions_px.size() < kLeastMatches
                                ? std::numeric_limits<double>::infinity()
                                : medianOf(std::move(motions_px));
-  same_images_ = sameImages(motion_px);
+  same_images_ = std::min(sameImages(motion_px), kMostSameImages);
 }
 
 void MatchNoise::see(std::vector<double> sigmas_px) {

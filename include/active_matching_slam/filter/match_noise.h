@@ -10,12 +10,9 @@ namespace active_matching_slam {
 /// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
 constexpr double kLastingShare = 0.5;
 
-/// Images over which what lasts is the same, for matches that move by so much from one to the next
-/// [px]: the sum of its correlations with that of all images.
-double sameImages(double motion_px);
-
-/// Correlation of what lasts with that in the image before, if it falls by the same factor from
-/// each image to the next.
+/// Correlation of what lasts with that in the image before, for matches that moved by so much from
+/// there [px]. While they move on like this, its sum over all images is how many it takes until
+/// what lasts is another.
 double persistence(double motion_px);
 
 /// How much more or less noisy the matches of one feature are than most: some corners are cleaner
