@@ -10,6 +10,7 @@
 
 #include "active_matching_slam/image/corners.h"
 #include "active_matching_slam/matching/matcher.h"
+#include "active_matching_slam/simulation/simulator.h"
 #include "tracker/simulated_frames.h"
 
 namespace active_matching_slam {
@@ -90,6 +91,21 @@ TEST(Tracker, LearnsHowGoodMatchesAre) {
   Tracker other = slowTracker(never);
   for (const auto& frame : trackFrames(slowFilm(), &other, 0, 60))
     EXPECT_EQ(frame->match_sigma_px, frame->index == 0 ? 0.0 : options.filter.sigma_px);
+}
+
+TEST(Tracker, LearnsNoNoiseWhileDepthsAreAGuess) {
+  // At first this camera all but rests: its matches are better than any that will come.
+  SimulatorOptions simulation;
+  simulation.motion = "jerky";
+  simulation.seed = 2;
+  simulation.duration_s = 0.4;
+  Simulator simulator(simulation);
+  const TrackerOptions options;
+  Tracker tracker(simulator.camera(), options);
+  while (const auto image = simulator.next()) {
+    const auto frame = tracker.track(image->image, image->stamp_s);
+    EXPECT_EQ(frame->match_sigma_px, image->index == 0 ? 0.0 : options.filter.sigma_px);
+  }
 }
 
 TEST(Tracker, RepeatsItselfBitForBit) {
