@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -211,14 +212,18 @@ void writeStructureReport(const std::string& directory, const MutualInformationG
   writeTextFile(directory + "/mutual_information.csv", mutualInformationCsv(graph));
   writeTextFile(directory + "/submaps.csv", submapsCsv(hierarchy));
   writeTextFile(directory + "/submap_quality.csv", submapQualityCsv(hierarchy));
-  for (int level = 1; level < static_cast<int>(hierarchy.levels.size()); ++level) {
+  const auto pathOf = [&directory](int level) {
+    return directory + "/mutual_information_level_" + std::to_string(level) + ".png";
+  };
+  const int levels = static_cast<int>(hierarchy.levels.size());
+  for (int level = 1; level < levels; ++level) {
+    std::filesystem::remove(pathOf(level));
     if (hierarchy.levels[level].submaps < 2) continue;
-    const std::string path =
-        directory + "/mutual_information_level_" + std::to_string(level) + ".png";
-    if (!cv::imwrite(path, informationMatrixPicture(graph, hierarchy, level))) {
-      throw std::runtime_error(path + ": cannot be written");
-    }
+    if (!cv::imwrite(pathOf(level), informationMatrixPicture(graph, hierarchy, level)))
+      throw std::runtime_error(pathOf(level) + ": cannot be written");
   }
+  // Of another map, which had more.
+  for (int level = std::max(levels, 1); std::filesystem::remove(pathOf(level));) ++level;
 }
 
 }  // namespace active_matching_slam

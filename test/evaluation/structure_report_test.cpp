@@ -106,12 +106,15 @@ TEST(StructureReport, WritesTablesAndAPictureOfEachIntermediateLevel) {
   const std::filesystem::path folder =
       std::filesystem::path(testing::TempDir()) / "ams_structure_report";
   std::filesystem::create_directories(folder);
+  for (const char* level : {"2", "3"})  // of another map
+    std::ofstream(folder / ("mutual_information_level_" + std::string(level) + ".png")) << "old";
   writeStructureReport(folder.string(), graph, hierarchy);
   EXPECT_EQ(contentOf(folder / "mutual_information.csv"), mutualInformationCsv(graph));
   EXPECT_EQ(contentOf(folder / "submaps.csv"), submapsCsv(hierarchy));
   EXPECT_EQ(contentOf(folder / "submap_quality.csv"), submapQualityCsv(hierarchy));
   EXPECT_TRUE(std::filesystem::exists(folder / "mutual_information_level_1.png"));
   EXPECT_FALSE(std::filesystem::exists(folder / "mutual_information_level_2.png"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "mutual_information_level_3.png"));
   std::filesystem::remove_all(folder);
 }
 

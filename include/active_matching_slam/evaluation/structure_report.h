@@ -29,8 +29,8 @@ cv::Mat informationMatrixPicture(const MutualInformationGraph& graph,
                                  const SubmapHierarchy& hierarchy, int level);
 
 /// Writes mutual_information.csv, submaps.csv, submap_quality.csv and, for every level that groups
-/// features without joining all, mutual_information_level_<level>.png into an existing directory.
-/// Throws std::runtime_error naming the file.
+/// features without joining all, mutual_information_level_<level>.png into an existing directory,
+/// in place of any that are there. Throws std::runtime_error naming the file.
 void writeStructureReport(const std::string& directory, const MutualInformationGraph& graph,
                           const SubmapHierarchy& hierarchy);
 
