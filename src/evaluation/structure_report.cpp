@@ -216,14 +216,12 @@ void writeStructureReport(const std::string& directory, const MutualInformationG
     return directory + "/mutual_information_level_" + std::to_string(level) + ".png";
   };
   const int levels = static_cast<int>(hierarchy.levels.size());
-  for (int level = 1; level < levels; ++level) {
-    std::filesystem::remove(pathOf(level));
-    if (hierarchy.levels[level].submaps < 2) continue;
+  // Those of a map before, which may have had more levels, go first.
+  for (int level = 1; std::filesystem::remove(pathOf(level)) || level < levels; ++level) {
+    if (level >= levels || hierarchy.levels[level].submaps < 2) continue;
     if (!cv::imwrite(pathOf(level), informationMatrixPicture(graph, hierarchy, level)))
       throw std::runtime_error(pathOf(level) + ": cannot be written");
   }
-  // Of another map, which had more.
-  for (int level = std::max(levels, 1); std::filesystem::remove(pathOf(level));) ++level;
 }
 
 }  // namespace active_matching_slam

@@ -10,12 +10,6 @@
 namespace active_matching_slam {
 namespace {
 
-BundleOptions weakPrior() {
-  BundleOptions options;
-  options.sigma_inverse_depth = 3.0;
-  return options;
-}
-
 /// All features at one depth and no camera moved: what is known before anything is.
 Bundle withoutKnowledge(Bundle bundle) {
   for (FeatureState& feature : bundle.features) feature.inverse_depth = 1.0;

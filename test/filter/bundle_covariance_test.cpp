@@ -20,8 +20,7 @@ constexpr int kCalibrationSize = CameraError::kCalibrationSize;
 constexpr double kScaleSigma = 0.01;
 
 BundleOptions bundleOptions() {
-  BundleOptions options;
-  options.sigma_inverse_depth = 3.0;
+  BundleOptions options = weakPrior();
   options.sigma_px = 0.45;
   options.outlier_px = 1e6;
   options.sigma_calibration << 0.01, 0.01, 0.01, 0.1, 0.1;

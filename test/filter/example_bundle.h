@@ -38,6 +38,13 @@ inline Bundle exampleBundle(const CameraModel& model, int cameras, int features,
   return bundle;
 }
 
+/// Depths are what the images say.
+inline BundleOptions weakPrior() {
+  BundleOptions options;
+  options.sigma_inverse_depth = 3.0;
+  return options;
+}
+
 /// Directions of two moves as a cosine.
 inline double cosineBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return a.normalized().dot(b.normalized());
