@@ -1,38 +1,52 @@
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
 #include "active_matching_slam/filter/triangular.h"
 #include "bundle_equations.h"
 
 namespace active_matching_slam {
 namespace {
 
-/// Adds to the covariance what lasting errors do to the estimate beyond white ones: A^-1 E A^-1
-/// (White's sandwich), with the information A and the `excess` E. `inverse_root` and `M` as below.
-void addLastingErrors(const BundleMatrix& excess, const CameraEquations& reduced,
-                      const Eigen::MatrixXd& inverse_root, const Eigen::MatrixXd& M, int kept,
-                      Eigen::MatrixXd* covariance) {
-  const Eigen::Index C = excess.cameras.rows();  // without the lens, which comes last
-  const auto W = reduced.cross.topRows(C);
-  const int F = static_cast<int>(excess.features.size());
-  // Once the features are eliminated, the cameras' excess is E - Z W^T - W Z^T, and that with the
-  // features' own U.
-  Eigen::MatrixXd Z(C, W.cols()), U(C, W.cols());
-  for (int i = 0; i < F; ++i) {
-    const Eigen::Matrix3d& root = reduced.inverse_roots[i];
-    const Eigen::Matrix3d own = root * excess.features[i] * root.transpose();
-    const Eigen::Matrix<double, Eigen::Dynamic, 3> half = 0.5 * W.middleCols<3>(3 * i) * own;
-    auto Zi = Z.middleCols<3>(3 * i);
-    Zi.noalias() = excess.cross.middleCols<3>(3 * i).lazyProduct(root.transpose()) - half;
-    U.middleCols<3>(3 * i).noalias() = (Zi - half).lazyProduct(root);
-    covariance->block<3, 3>(kept + 3 * i, kept + 3 * i) += root.transpose() * own * root;
+/// Most of what is known of something that one feature is taken to tell.
+constexpr double kMostShare = 0.9;
+
+/// How much more the last camera scatters, by what the features show, than A^-1 says for the
+/// information A: its rotation, and its position across the way from the first, which no unit of
+/// length changes. `inverse_root` as below.
+double scatterOfLastCamera(const CameraModel& model, const BundleOptions& options,
+                           const Bundle& bundle, const NormalEquations& N,
+                           const CameraEquations& reduced, const Eigen::MatrixXd& inverse_root) {
+  const Eigen::Index C = inverse_root.rows() - kLensSize, last = C - 7;  // before the readout
+  const Eigen::Vector3d along = bundle.cameras.back().position_world.normalized();
+  const Eigen::Vector3d across = along.unitOrthogonal();
+  LastPoseMap seen = LastPoseMap::Zero(kLastPoseSize, C);
+  seen.block<1, 3>(0, last) = across.transpose();
+  seen.block<1, 3>(1, last) = along.cross(across).transpose();
+  seen.block<3, 3>(2, last + 3).setIdentity();
+
+  const auto root = inverse_root.topLeftCorner(C, C);
+  const Eigen::MatrixXd half = seen * root.transpose();
+  using Matrix = Eigen::Matrix<double, kLastPoseSize, kLastPoseSize>;
+  const Matrix said = half * half.transpose();
+  const Eigen::LLT<Matrix> said_root(said);
+  if (said_root.info() != Eigen::Success) return 1.0;
+  // In units of what is said, features share one unit of information.
+  const LastPoseMap map = said_root.matrixL().solve(half * root);
+  const FeaturePulls pulls = pullsOfFeatures(model, options, bundle, N, reduced, map);
+  double squares = 0.0, of_squares = 0.0;
+  for (const FeaturePull& pull : pulls.features) {
+    const Eigen::SelfAdjointEigenSolver<Matrix> shares(pull.information);
+    const Eigen::Array<double, kLastPoseSize, 1> moved =
+        shares.eigenvectors().transpose() * pull.gradient;
+    const double square =
+        (moved / (1.0 - shares.eigenvalues().array().min(kMostShare))).square().sum();
+    squares += square;
+    of_squares += square * square;
   }
-  Eigen::MatrixXd E = excess.cameras.selfadjointView<Eigen::Lower>();
-  const Eigen::MatrixXd by_features = Z * W.transpose();
-  E -= by_features;
-  E -= by_features.transpose();
-  const Eigen::MatrixXd T = M.leftCols(C) * inverse_root.topLeftCorner(C, C);
-  covariance->noalias() += T * E * T.transpose();
-  const Eigen::MatrixXd with_features = T * U;
-  covariance->rightCols(3 * F) += with_features;
-  covariance->bottomRows(3 * F) += with_features.transpose();
+  if (!(squares > 0.0)) return 1.0;
+  // Few features show it: errors are larger, in what is shown, than in what is.
+  squares += of_squares / squares;
+  return pulls.yielding * pulls.yielding * squares / kLastPoseSize;
 }
 
 }  // namespace
@@ -54,7 +68,12 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
     M.middleRows<3>(kept + 3 * i).noalias() = -reduced->inverse_roots[i].transpose().lazyProduct(
         reduced->cross.middleCols<3>(3 * i).transpose());
   }
-  const Eigen::MatrixXd inverse_root = inverseRoot(reduced->factor);
+  Eigen::MatrixXd inverse_root = inverseRoot(reduced->factor);
+  double scatter = 1.0;
+  if (options.scale_by_scatter) {
+    scatter = scatterOfLastCamera(model, options, bundle, N, *reduced, inverse_root);
+    inverse_root.bottomRows<kLensSize>() /= std::sqrt(scatter);  // nothing shows the lens
+  }
   timesTransposeOf(inverse_root, M);
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(M.rows(), M.rows());
   auto lower = covariance.selfadjointView<Eigen::Lower>();
@@ -62,13 +81,12 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   for (int i = 0; i < F; ++i)
     covariance.block<3, 3>(kept + 3 * i, kept + 3 * i) +=
         reduced->inverse_roots[i].transpose() * reduced->inverse_roots[i];
-  if (options.lasting_share > 0.0)
-    addLastingErrors(lastingExcess(model, options, bundle), *reduced, inverse_root, M, kept,
-                     &covariance);
+  covariance *= scatter;
   // The unit is known as well as said: one more measurement.
   Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.rows());
+  const Eigen::VectorXd shares = depthShares(N, bundle);
   for (int i = 0; i < F; ++i)
-    depths[kept + 3 * i + 2] = 1.0 / (F * bundle.features[i].inverse_depth);
+    depths[kept + 3 * i + 2] = shares[i] / bundle.features[i].inverse_depth;
   const Eigen::VectorXd along = lower * depths;
   const double variance = depths.dot(along);
   lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + variance));

@@ -1,5 +1,6 @@
 #include "bundle_equations.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -46,43 +47,6 @@ std::optional<LinearPoint> linearPoint(const CameraModel& model, const BundleOpt
                  (1.0 + point.squared_px2 / (options.outlier_px * options.outlier_px));
   return point;
 }
-
-/// An image point times the root of its information.
-struct WhitePoint {
-  int image = 0;
-  Matrix26 d_pose;
-  Eigen::Vector2d d_readout;
-  Matrix23 d_feature;
-};
-
-/// Those of each feature, by images.
-std::vector<std::vector<WhitePoint>> whitePoints(const CameraModel& model,
-                                                 const BundleOptions& options,
-                                                 const Bundle& bundle) {
-  std::vector<std::vector<WhitePoint>> points(bundle.features.size());
-  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
-    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
-    for (const BundleObservation& o : bundle.observations[k]) {
-      const auto point = linearPoint(model, options, bundle, k, R, o);
-      if (!point) continue;
-      const double root = std::sqrt(point->weight);
-      points[o.feature].push_back({static_cast<int>(k), root * point->d_pose,
-                                   root * o.d_calibration.col(0), root * point->d_feature});
-    }
-  }
-  return points;
-}
-
-/// Sum over the images that share errors with one, by how much they do.
-struct Shared {
-  Eigen::Vector2d d_readout = Eigen::Vector2d::Zero();
-  Matrix23 d_feature = Matrix23::Zero();
-
-  void add(double share, const WhitePoint& point) {
-    d_readout += share * point.d_readout;
-    d_feature += share * point.d_feature;
-  }
-};
 
 }  // namespace
 
@@ -166,43 +130,49 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
   return N;
 }
 
-BundleMatrix lastingExcess(const CameraModel& model, const BundleOptions& options,
-                           const Bundle& bundle) {
-  const int K = static_cast<int>(bundle.cameras.size()) - 1;
-  const int F = static_cast<int>(bundle.features.size());
-  const int readout = 6 * K, C = readout + 1;
-  BundleMatrix excess;
-  excess.cameras = Eigen::MatrixXd::Zero(C, C);
-  excess.features.assign(F, Eigen::Matrix3d::Zero());
-  excess.cross = Eigen::MatrixXd::Zero(C, 3 * F);
-  auto points = whitePoints(model, options, bundle);
-  for (int i = 0; i < F; ++i) {
-    std::vector<WhitePoint>& seen = points[i];
-    // Matches are off from where the feature was seen first, and that one is by itself.
-    if (!seen.empty()) seen.erase(seen.begin());
-    std::vector<Shared> shared(seen.size());
-    for (std::size_t a = 0; a < seen.size(); ++a) {
-      const WhitePoint& p = seen[a];
-      double share = options.lasting_share;
-      for (std::size_t b = a + 1; b < seen.size(); ++b) {
-        const WhitePoint& q = seen[b];
-        for (int k = seen[b - 1].image + 1; k <= q.image; ++k) share *= bundle.persistence[k];
-        const Matrix26 of_p = share * p.d_pose;
-        excess.cameras.block<6, 6>(6 * (q.image - 1), 6 * (p.image - 1)).noalias() +=
-            q.d_pose.transpose() * of_p;
-        shared[a].add(share, q);
-        shared[b].add(share, p);
-      }
-      const int row = 6 * (p.image - 1);
-      const Shared& others = shared[a];
-      excess.cameras.block<1, 6>(readout, row) += others.d_readout.transpose() * p.d_pose;
-      excess.cameras(readout, readout) += others.d_readout.dot(p.d_readout);
-      excess.cross.block<6, 3>(row, 3 * i) = p.d_pose.transpose() * others.d_feature;
-      excess.cross.block<1, 3>(readout, 3 * i) += p.d_readout.transpose() * others.d_feature;
-      excess.features[i] += p.d_feature.transpose() * others.d_feature;
+Eigen::VectorXd depthShares(const NormalEquations& N, const Bundle& bundle) {
+  Eigen::VectorXd shares(bundle.features.size());
+  for (Eigen::Index i = 0; i < shares.size(); ++i) {
+    const double variance = N.features[i].inverse()(2, 2);
+    shares[i] = std::pow(bundle.features[i].inverse_depth, 2) / variance;
+  }
+  return shares / shares.sum();
+}
+
+FeaturePulls pullsOfFeatures(const CameraModel& model, const BundleOptions& options,
+                             const Bundle& bundle, const NormalEquations& N,
+                             const CameraEquations& reduced, const LastPoseMap& map) {
+  const int readout = 6 * (static_cast<int>(bundle.cameras.size()) - 1);
+  FeaturePulls pulls;
+  pulls.features.resize(bundle.features.size());
+  double weights = 0.0, slopes = 0.0;
+  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
+    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
+    for (const BundleObservation& o : bundle.observations[k]) {
+      const auto point = linearPoint(model, options, bundle, k, R, o);
+      if (!point) continue;
+      const double sigma_px = options.sigma_px * o.noise;
+      const double robust = point->weight * sigma_px * sigma_px;
+      weights += robust;
+      slopes += robust * robust;
+      Eigen::Matrix<double, kLastPoseSize, 2> J =
+          map.col(readout) * o.d_calibration.col(0).transpose();
+      if (k > 0) J += map.middleCols<6>(6 * static_cast<int>(k - 1)) * point->d_pose.transpose();
+      FeaturePull& pull = pulls.features[o.feature];
+      pull.gradient += point->weight * (J * point->residual_px);
+      pull.information += point->weight * (J * J.transpose());
     }
   }
-  return excess;
+  for (std::size_t i = 0; i < bundle.features.size(); ++i) {
+    const auto from = static_cast<Eigen::Index>(3 * i);
+    const Eigen::Matrix<double, kLastPoseSize, 3> J =
+        map * reduced.cross.block(0, from, map.cols(), 3);
+    FeaturePull& pull = pulls.features[i];
+    pull.gradient -= J * (reduced.inverse_roots[i] * N.feature_gradient.segment<3>(from));
+    pull.information -= J * J.transpose();
+  }
+  if (slopes > 0.0) pulls.yielding = weights / slopes;
+  return pulls;
 }
 
 /// With the diagonal grown by `damping`. Empty when not positive definite. Given

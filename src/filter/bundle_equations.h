@@ -36,12 +36,6 @@ struct NormalEquations : BundleMatrix {
 NormalEquations linearise(const CameraModel& model, const BundleOptions& options,
                           const Bundle& bundle);
 
-/// By how much the covariance of the gradient is more than the information, because errors of image
-/// points last from image to image (BundleOptions::lasting_share). C = 6K + 1: the lens, which is
-/// not learnt, is left out.
-BundleMatrix lastingExcess(const CameraModel& model, const BundleOptions& options,
-                           const Bundle& bundle);
-
 /// The normal equations of the cameras alone, once the features are eliminated.
 struct CameraEquations {
   Eigen::LLT<Eigen::MatrixXd> factor;          ///< C x C
@@ -53,6 +47,34 @@ struct CameraEquations {
 /// `lens_information`, that is all that is known of the lens once the rest is eliminated.
 std::optional<CameraEquations> eliminateFeatures(const BundleMatrix& information, double damping,
                                                  const LensVector* lens_information = nullptr);
+
+/// What each feature tells of the logarithm of the unit of length, if the cameras were known:
+/// shares of 1.
+Eigen::VectorXd depthShares(const NormalEquations& N, const Bundle& bundle);
+
+/// Combinations of what the normal equations have of the cameras and of the readout.
+constexpr int kLastPoseSize = 5;
+using LastPoseMap = Eigen::Matrix<double, kLastPoseSize, Eigen::Dynamic>;
+
+/// What the image points of one feature say, once it is eliminated, of such combinations.
+struct FeaturePull {
+  Eigen::Matrix<double, kLastPoseSize, 1> gradient =
+      Eigen::Matrix<double, kLastPoseSize, 1>::Zero();
+  Eigen::Matrix<double, kLastPoseSize, kLastPoseSize> information =
+      Eigen::Matrix<double, kLastPoseSize, kLastPoseSize>::Zero();
+};
+
+struct FeaturePulls {
+  std::vector<FeaturePull> features;
+  /// By how much more a minimum yields than the information says: the slope of a robust function
+  /// falls below its weight.
+  double yielding = 1.0;
+};
+
+/// Through `map`, 5 x (6K + 1).
+FeaturePulls pullsOfFeatures(const CameraModel& model, const BundleOptions& options,
+                             const Bundle& bundle, const NormalEquations& N,
+                             const CameraEquations& reduced, const LastPoseMap& map);
 
 /// Inverse variances of the prior.
 CalibrationVector calibrationInformation(const BundleOptions& options);

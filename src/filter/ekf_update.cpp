@@ -71,8 +71,10 @@ UpdateReport Ekf::update(const CameraModel& camera,
   const std::size_t room = static_cast<std::size_t>(n) * (rows + kGaugeFreedoms);
   if (workspace_.size() < room) workspace_.resize(room);
   Eigen::Map<Eigen::MatrixXd> X(workspace_.data(), n, rows + kGaugeFreedoms);
+  ImpulseRoot impulse = ImpulseRoot::Zero();
+  if (impulse_) impulse = impulse_->G * impulse_->variance.cwiseSqrt().asDiagonal();
   MeasurementUpdate correction(camera, camera_, features_, covariance_, usable,
-                               options_.calibration_share, X.leftCols(rows));
+                               options_.calibration_share, impulse, X.leftCols(rows));
   if (!correction.solve(options_.update_iterations)) {
     report.healthy = false;
     return report;
@@ -81,7 +83,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
     report.noise_left[given[i]] = correction.noiseLeft()[i];
     report.left_px[given[i]] = correction.leftPx()[i];
   }
-  const Eigen::MatrixXd more = correction.finish();
+  const MotionCovariance added = correction.finish();
   impulse_.reset();
   camera_ = correction.camera();
   features_ = correction.features();
@@ -92,7 +94,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
           CameraError::kReadout, CameraError::kReadout);
   const auto calibration_before = calibration.eval();
   report.healthy = correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
-                                     correction.gaugeCovariance(), more, rows, X);
+                                     correction.gaugeCovariance(), added, rows, X);
   const double not_made = 1.0 - options_.calibration_share;
   calibration += not_made * not_made * (calibration_before - calibration);
   limitInverseDepths();
@@ -100,19 +102,18 @@ UpdateReport Ekf::update(const CameraModel& camera,
 }
 
 bool Ekf::correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
-                            const Eigen::MatrixXd& PL, const Eigen::MatrixXd& more, int columns,
+                            const Eigen::MatrixXd& PL, const MotionCovariance& added, int columns,
                             Eigen::Ref<Eigen::MatrixXd> X) {
   constexpr int kMotion = CameraError::kMotionSize;
   auto P = covariance_.view();
   const Eigen::VectorXd variances_before = P.diagonal();
   const auto measured = X.leftCols(columns);
 
-  // With P' = P - X X^T - D: M P' M^T = P' + C Y^T + Y C^T for Y = P' L + C (L^T P' L) / 2, and
+  // With P' = P - X X^T + D: M P' M^T = P' + C Y^T + Y C^T for Y = P' L + C (L^T P' L) / 2, and
   // each column adds a difference of two squares: c y^T + y c^T = (a a^T - b b^T) / 2 with a = s c
   // + y / s, b = s c - y / s. The b join the columns of X.
   Eigen::MatrixXd Y = PL - measured * (measured.transpose() * L);
-  Y.topRows<kMotion>() -= more * L - more.leftCols<kMotion>() * L.topRows<kMotion>();
-  Y.noalias() -= more.transpose() * L.topRows<kMotion>();
+  Y.topRows<kMotion>() += added * L.topRows<kMotion>();
   Y += 0.5 * C * (L.transpose() * Y).eval();
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(P.rows(), kGaugeFreedoms);
   auto B = X.middleCols<kGaugeFreedoms>(columns);
@@ -126,7 +127,7 @@ bool Ekf::correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
   }
   P.selfadjointView<Eigen::Lower>().rankUpdate(X, -1.0);
   P.selfadjointView<Eigen::Lower>().rankUpdate(A, 1.0);
-  P.leftCols<kMotion>() -= more.transpose();
+  P.topLeftCorner<kMotion, kMotion>() += added;
   const bool sound = repairVariances(variances_before);
   covariance_.mirrorLower();
   return sound;

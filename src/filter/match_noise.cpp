@@ -12,14 +12,16 @@ namespace active_matching_slam {
 namespace {
 
 constexpr std::size_t kLeastMatches = 8;
-constexpr double kLeastWeight = 0.05;  ///< of one update in the average, once there are many
+/// Of one update in the average, once there are many.
+constexpr double kLeastWeightShown = 0.6, kLeastWeightSeen = 0.05;
 /// The noise that matches are taken to have, in what updates show. (By NEES over rendered runs, as
 /// are the next.)
-constexpr double kShareOfShown = 0.858;
-/// Motion of the image after which what lasts of the errors is another, and the most images that an
-/// update takes for the same.
-constexpr double kFreshPx = 50.0;
-constexpr double kMostSameImages = 15.0;
+constexpr double kShareOfShown = 0.95;
+/// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
+constexpr double kLastingShare = 0.5;
+/// Motion of the image after which what lasts is another, and the most images that are taken to
+/// have it in common.
+constexpr double kFreshPx = 5.0, kMostSameImages = 15.0;
 /// Power of what images tell by which corners wander more. (By the same.)
 constexpr double kWanderByMisfit = 2.0;
 constexpr double kSharpest = 0.2, kMostBlurred = 5.0;  ///< image, in what most tell
@@ -30,15 +32,7 @@ constexpr double kMemory = 0.99;      ///< of a feature's noise, a match
 constexpr double kLikeOthers = 20.0;  ///< matches for which a feature is taken to be like others
 constexpr double kMostSigmas = 10.0;  ///< that one match says
 
-/// Images until what lasts is another, for matches that move by so much from one to the next [px].
-double sameImages(double motion_px) { return std::max(kFreshPx / motion_px, 1.0); }
-
 }  // namespace
-
-double persistence(double motion_px) {
-  const double images = sameImages(motion_px);
-  return (images - 1.0) / (images + 1.0);
-}
 
 double MatchNoise::learn(const std::vector<Eigen::Vector2d>& residuals_px) {
   std::vector<double> sizes_px;
@@ -49,7 +43,7 @@ double MatchNoise::learn(const std::vector<Eigen::Vector2d>& residuals_px) {
   }
   if (sizes_px.size() < 2 * kLeastMatches) return 0.0;
   const double shown_px = kSigmaByMedian * medianOf(std::move(sizes_px));
-  const double weight = std::max(kLeastWeight, 1.0 / ++updates_);
+  const double weight = std::max(kLeastWeightShown, 1.0 / ++updates_);
   shown_px2_ += weight * (std::pow(shown_px / of_image_, 2) - shown_px2_);
   return shown_px;
 }
@@ -58,14 +52,14 @@ void MatchNoise::seeMotion(std::vector<double> motions_px) {
   const double motion_px = motions_px.size() < kLeastMatches
                                ? std::numeric_limits<double>::infinity()
                                : medianOf(std::move(motions_px));
-  same_images_ = std::min(sameImages(motion_px), kMostSameImages);
+  same_images_ = std::clamp(kFreshPx / motion_px, 1.0, kMostSameImages);
 }
 
 void MatchNoise::see(std::vector<double> sigmas_px) {
   of_image_ = 1.0;
   if (sigmas_px.size() < kLeastMatches) return;
   const double now_px = medianOf(std::move(sigmas_px));
-  seen_px_ += (seen_px_ > 0.0 ? kLeastWeight : 1.0) * (now_px - seen_px_);
+  seen_px_ += (seen_px_ > 0.0 ? kLeastWeightSeen : 1.0) * (now_px - seen_px_);
   if (seen_px_ > 0.0) of_image_ = std::clamp(now_px / seen_px_, kSharpest, kMostBlurred);
 }
 

@@ -10,6 +10,7 @@
 namespace active_matching_slam {
 namespace {
 
+constexpr int kMotion = CameraError::kMotionSize;
 /// Linearisation is repeated when it missed by more than this, root mean square, in sigmas.
 constexpr double kNonlinearityTolerance = 0.2;
 /// A measurement's squared distance from what all others say of it, in sigmas; of 2 expected.
@@ -21,13 +22,15 @@ MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState
                                      const std::vector<FeatureState>& features,
                                      const CovarianceMatrix& covariance,
                                      std::vector<UsableMeasurement> measurements,
-                                     double calibration_share, Eigen::Ref<Eigen::MatrixXd> X)
+                                     double calibration_share, const ImpulseRoot& impulse,
+                                     Eigen::Ref<Eigen::MatrixXd> X)
     : model_(model),
       prior_camera_(camera),
       prior_features_(features),
       covariance_(covariance),
       measurements_(std::move(measurements)),
       calibration_share_(calibration_share),
+      impulse_(impulse),
       X_(X),
       camera_(camera),
       features_(features) {
@@ -61,12 +64,30 @@ bool MeasurementUpdate::linearise() {
   return true;
 }
 
-void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) const {
+void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) {
+  second_order_.assign(measurements_.size(), Eigen::Matrix2d::Zero());
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    if (moments_[i](3, 3) > 0.0)
+      second_order_[i] = secondOrderNoise(stack_.projection(i), moments_[i]);
     auto block = S.block<2, 2>(2 * i, 2 * i);
+    block += second_order_[i];
     block.diagonal().array() += measurements_[i].variance_px2;
-    if (moments_[i](3, 3) > 0.0) block += secondOrderNoise(stack_.projection(i), moments_[i]);
   }
+}
+
+/// What the impulse, which is anew in each image, makes of the measurements once the rest is known:
+/// K = (1 + B^T R^-1 B)^-1 B^T R^-1, for `B` = d(pixels) / d(impulse) and the noise R of one image.
+Eigen::Matrix<double, 6, Eigen::Dynamic> MeasurementUpdate::impulseGain(
+    const Eigen::MatrixXd& B) const {
+  Eigen::Matrix<double, 6, Eigen::Dynamic> weighted = B.transpose();
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    const Eigen::Matrix2d R =
+        measurements_[i].variance_px2 * Eigen::Matrix2d::Identity() + second_order_[i];
+    weighted.middleCols<2>(2 * i) = weighted.middleCols<2>(2 * i) * R.inverse();
+  }
+  const Eigen::Matrix<double, 6, 6> information =
+      Eigen::Matrix<double, 6, 6>::Identity() + weighted * B;
+  return information.llt().solve(weighted);
 }
 
 /// `weighted`: S^-1 y for the innovation y. Of what the others leave of y_i, the covariance is the
@@ -94,10 +115,29 @@ bool MeasurementUpdate::doubtStrays(const Eigen::VectorXd& weighted, Eigen::Matr
   return any;
 }
 
+/// How far off each measurement is, by the first innovation and the S of the noise expected, which
+/// then is that of the noise found. False when S could not be factorised.
+bool MeasurementUpdate::judgeNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S) {
+  const auto weigh = [&](Eigen::VectorXd* weighted) {
+    llt_.compute(S);
+    if (llt_.info() != Eigen::Success) return false;
+    *weighted = llt_.solve(innovation);
+    return true;
+  };
+  Eigen::VectorXd weighted;
+  if (!weigh(&weighted)) return false;
+  nis_ = innovation.dot(weighted);
+  if (doubtStrays(weighted, S) && !weigh(&weighted)) return false;
+  left_px_.clear();
+  for (std::size_t i = 0; i < measurements_.size(); ++i)
+    left_px_.push_back(measurements_[i].variance_px2 * weighted.segment<2>(2 * i));
+  return true;
+}
+
 bool MeasurementUpdate::step(bool first) {
   stack_.crossCovariance(covariance_, X_);
   Eigen::VectorXd innovation = z_ - stack_.pixels();
-  Eigen::MatrixXd S;
+  Eigen::MatrixXd S, B = stack_.cameraJacobian().leftCols<kMotion>() * impulse_;
   if (first) {
     S = stack_.innovationCovariance(X_);
   } else {
@@ -107,29 +147,24 @@ bool MeasurementUpdate::step(bool first) {
     S = stack_.innovationCovariance(X_);
     S.noalias() += HC * (L_.transpose() * X_);
     innovation += stack_.times(delta_) + HC * (L_.transpose() * delta_);
+    B.noalias() += HC * (L_.topRows<kMotion>().transpose() * impulse_);
   }
   addNoise(S);
+  if (first && !judgeNoise(innovation, S)) return false;
+  Eigen::VectorXd lasting_px2(2 * measurements_.size());
+  for (std::size_t i = 0; i < measurements_.size(); ++i)
+    lasting_px2.segment<2>(2 * i).setConstant(measurements_[i].lasting_px2);
+  S.diagonal() += lasting_px2;
   llt_.compute(S);
   if (llt_.info() != Eigen::Success) return false;
-  Eigen::VectorXd weighted = llt_.solve(innovation);
-  if (first) {
-    nis_ = innovation.dot(weighted);
-    if (doubtStrays(weighted, S)) {
-      llt_.compute(S);
-      if (llt_.info() != Eigen::Success) return false;
-      weighted = llt_.solve(innovation);
-    }
-    left_px_.clear();
-    for (std::size_t i = 0; i < measurements_.size(); ++i)
-      left_px_.push_back(measurements_[i].variance_px2 * weighted.segment<2>(2 * i));
-  }
-  for (std::size_t i = 0; i < measurements_.size(); ++i)
-    S.diagonal().segment<2>(2 * i).array() += measurements_[i].lasting_px2;
-  lasting_llt_.compute(S);
-  if (lasting_llt_.info() != Eigen::Success) return false;
-  delta_.noalias() = X_ * lasting_llt_.solve(innovation);
-  delta_.head<CameraError::kMotionSize>().noalias() =
-      X_.topRows<CameraError::kMotionSize>() * weighted;
+  // With Q = G G^T the impulse's covariance and K its gain: what the rest leaves is fused by K. Put
+  // together, the motion's rows of P H^T grow by G K L, for the lasting noise L, and its covariance
+  // by G K L K^T G^T.
+  const Eigen::Matrix<double, kMotion, Eigen::Dynamic> GK = impulse_ * impulseGain(B);
+  const Eigen::Matrix<double, kMotion, Eigen::Dynamic> more = GK * lasting_px2.asDiagonal();
+  X_.topRows<kMotion>() += more;
+  added_.noalias() = more * GK.transpose();
+  delta_.noalias() = X_ * llt_.solve(innovation);
   delta_.segment<CameraError::kCalibrationSize>(CameraError::kReadout) *= calibration_share_;
   if (!delta_.allFinite()) return false;
   camera_ = prior_camera_;
@@ -160,13 +195,9 @@ bool MeasurementUpdate::solve(int iterations) {
   return true;
 }
 
-Eigen::MatrixXd MeasurementUpdate::finish() {
-  const auto motion = X_.topRows<CameraError::kMotionSize>();
-  const Eigen::MatrixXd gain = llt_.solve(motion.transpose());  // transposed
-  Eigen::MatrixXd more = gain.transpose() * X_.transpose();
-  timesTransposeOf(inverseRoot(lasting_llt_), X_);
-  more.noalias() -= motion * X_.transpose();
-  return more;
+MotionCovariance MeasurementUpdate::finish() {
+  timesTransposeOf(inverseRoot(llt_), X_);
+  return added_;
 }
 
 }  // namespace active_matching_slam

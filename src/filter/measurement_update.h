@@ -13,11 +13,15 @@ struct UsableMeasurement {
   int feature;  ///< index
   Eigen::Vector2d pixel;
   double variance_px2;
-  double lasting_px2;  ///< more of it, to map and calibration
+  double lasting_px2;  ///< more of it, to all but the impulse
 };
 
+/// By what impulses of unit covariance move the camera's motion (CameraError order).
+using ImpulseRoot = Eigen::Matrix<double, CameraError::kMotionSize, 6>;
+
 /// The gain of one update, by repeated linearisation (Bell & Cathey 1993), with the noise of what
-/// linearisation leaves out; for map and calibration with that of errors that last. A measurement
+/// linearisation leaves out and of errors that last; the impulse since the image before, once the
+/// rest is known so, with the noise of one image. A measurement
 /// that disagrees with all others is taken to have the noise with which it would not: matches are
 /// more often far off than a Gaussian's. All errors count from the prior mean; the Jacobian of an
 /// iteration is that of the mean reached. The second-order noise stays the prior's: shrunk along
@@ -30,14 +34,14 @@ class MeasurementUpdate {
   MeasurementUpdate(const CameraModel& model, const CameraState& camera,
                     const std::vector<FeatureState>& features, const CovarianceMatrix& covariance,
                     std::vector<UsableMeasurement> measurements, double calibration_share,
-                    Eigen::Ref<Eigen::MatrixXd> X);
+                    const ImpulseRoot& impulse, Eigen::Ref<Eigen::MatrixXd> X);
 
   /// False when S could not be factorised or the result is not finite: nothing is to be fused.
   bool solve(int iterations);
 
-  /// Makes P - X X^T the covariance after the measurement, but for the motion's rows and columns,
-  /// and before the transport of the gauge. Returns what is to be taken off those too.
-  Eigen::MatrixXd finish();
+  /// Makes P - X X^T the covariance after the measurement, but for what is returned, which is to be
+  /// added to that of the motion, and before the transport of the gauge.
+  MotionCovariance finish();
 
   const CameraState& camera() const { return camera_; }
   const std::vector<FeatureState>& features() const { return features_; }
@@ -53,7 +57,9 @@ class MeasurementUpdate {
  private:
   bool linearise();
   bool step(bool first);
-  void addNoise(Eigen::MatrixXd& S) const;
+  void addNoise(Eigen::MatrixXd& S);
+  bool judgeNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S);
+  Eigen::Matrix<double, 6, Eigen::Dynamic> impulseGain(const Eigen::MatrixXd& B) const;
   bool doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S);
   bool isLinearEnough(const Eigen::VectorXd& expected_pixels) const;
 
@@ -63,14 +69,17 @@ class MeasurementUpdate {
   const CovarianceMatrix& covariance_;
   std::vector<UsableMeasurement> measurements_;  ///< strays with the noise that they are given
   const double calibration_share_;
-  Eigen::Ref<Eigen::MatrixXd> X_;  ///< P H^T, at the end P H^T U^-T, U U^T the lasting S
+  const ImpulseRoot impulse_;
+  Eigen::Ref<Eigen::MatrixXd> X_;  ///< gain times S, at the end gain times U, where U U^T = S
 
   CameraState camera_;
   std::vector<FeatureState> features_;
   MeasurementStack stack_;
   Eigen::VectorXd z_, delta_;
   Eigen::MatrixXd prior_gauge_, C_, L_, PL_;
-  Eigen::LLT<Eigen::MatrixXd> llt_, lasting_llt_;  ///< of S, by the noise of one image and by all
+  Eigen::LLT<Eigen::MatrixXd> llt_;                    ///< of S, in the end with errors that last
+  MotionCovariance added_ = MotionCovariance::Zero();  ///< see finish()
+  std::vector<Eigen::Matrix2d> second_order_;          ///< noise of each measurement [px^2]
   std::vector<double> noise_left_;
   std::vector<Eigen::Vector2d> left_px_;
   std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "active_matching_slam/filter/match_motion.h"
-#include "active_matching_slam/filter/match_noise.h"
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/quantile.h"
 #include "adjusted_start.h"
@@ -17,7 +16,9 @@ namespace {
 
 /// Parallax: adjusted first at [sigma of the noise of image points], with every image until it is
 /// so much [px], and no more beyond.
-constexpr double kFirstParallaxSigmas = 0.75, kEveryImageUpToPx = 2.0, kLastParallaxPx = 20.0;
+constexpr double kFirstParallaxSigmas = 0.3, kEveryImageUpToPx = 2.0, kLastParallaxPx = 20.0;
+/// What the first reading, on so little parallax, leads by at least, in what others need to.
+constexpr double kFirstLead = 2.0;
 constexpr double kGrowth = 1.4;  ///< of parallax or time from one adjustment to the next, then
 /// Share of the points: where most are as far as each other, the few that are near tell the motion.
 constexpr double kAllButNear = 0.75;
@@ -66,10 +67,7 @@ FeatureState seenFromOrigin(const FeatureState& feature) {
   seen.anchor_world.setZero();
   seen.bearing_world = ray.normalized();
   seen.inverse_depth = weight / ray.norm();
-  const Eigen::Vector3d& m = seen.bearing_world;
-  const Eigen::Vector3d axis =
-      std::abs(m.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
-  seen.tangent_world = (axis - m * m.dot(axis)).normalized();
+  seen.tangent_world = seen.bearing_world.unitOrthogonal();
   return seen;
 }
 
@@ -123,6 +121,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   is_active_ = true;
   images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
   features_.clear();
+  adjusted_.clear();
   has_left_first_ = is_settled_ = false;
   least_motion_px_ = 1.0;
   last_parallax_px_ = next_parallax_px_ = 0.0;
@@ -156,8 +155,6 @@ void StartAdjustment::add(std::int64_t index, double interval_s, const Ekf& filt
     Eigen::Vector2d& speed = before.speeds[same - before.measurements.data()];
     speed = speed.isZero(0.0) ? image.speeds[i] : Eigen::Vector2d(0.5 * (speed + image.speeds[i]));
   }
-  std::vector<double> motions_px = matchMotions(before.measurements, measurements);
-  if (!motions_px.empty()) image.persistence = persistence(medianOf(std::move(motions_px)));
   images_.push_back(std::move(image));
   thinOut();
 }
@@ -186,20 +183,13 @@ void StartAdjustment::thinOut() {
   const std::size_t n = images_.size();
   if (n >= 4 && (images_[n - 3].measurements.size() < kLeastPoints ||
                  quantileOf(matchMotions(images_[n - 4].measurements, images_[n - 3].measurements),
-                            kAllButNear) < least_motion_px_)) {
-    images_[n - 2].persistence *= images_[n - 3].persistence;
+                            kAllButNear) < least_motion_px_))
     images_.erase(images_.end() - 3);
-  }
   if (images_.size() <= kMostImages) return;
   least_motion_px_ *= 2.0;
   std::vector<Image> kept;
-  double since_kept = 1.0;  // persistence
-  for (std::size_t i = 0; i < images_.size(); ++i) {
-    images_[i].persistence *= since_kept;
-    const bool stays = i % 2 == 0 || i + 2 >= images_.size();
-    since_kept = stays ? 1.0 : images_[i].persistence;
-    if (stays) kept.push_back(std::move(images_[i]));
-  }
+  for (std::size_t i = 0; i < images_.size(); ++i)
+    if (i % 2 == 0 || i + 2 >= images_.size()) kept.push_back(std::move(images_[i]));
   images_ = std::move(kept);
 }
 
@@ -254,7 +244,6 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
   const std::vector<double> of_features = noiseOfFeatures(*ids);
   for (std::size_t k = 0; k < images_.size(); ++k) {
     const Image& image = images_[k];
-    bundle.persistence.push_back(image.persistence);
     bundle.cameras.push_back(image.camera);
     bundle.observations.emplace_back();
     for (std::size_t i = 0; i < image.measurements.size(); ++i) {
@@ -314,8 +303,8 @@ std::optional<StartAdjustment::Reading> StartAdjustment::chooseReading(const Cam
     chosen.adjusted = Adjusted::kAllImages;
     return chosen;
   }
-  auto best = bestReading(model, options, chosen.bundle, last_parallax_px_ == 0.0);
-  if (!best) return std::nullopt;
+  auto best = bestReading(model, options, chosen.bundle, areDepthsGuessed());
+  if (!best || (areDepthsGuessed() && best->lead < kFirstLead)) return std::nullopt;
   chosen.bundle = std::move(best->bundle);
   chosen.lead = best->lead;
   return chosen;
@@ -380,8 +369,13 @@ std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel
 std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, const Ekf& filter,
                                                     Weighed weighed) {
   Reading& reading = weighed.reading;
-  // Others have seen the map: its unit of length stays.
-  rescaleBundle(depthFactor(weighed.believed, reading.bundle), &reading.bundle);
+  const bool is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
+  // Others have seen the map: its unit of length stays. Of depths that were hardly known only the
+  // middle means something.
+  rescaleBundle(is_refinement
+                    ? depthFactor(model, weighed.options, weighed.believed, reading.bundle)
+                    : medianDepthFactor(weighed.believed, reading.bundle),
+                &reading.bundle);
   auto start = makeAdjustedStart(model, filter, weighed.options, reading.bundle, reading.ids,
                                  images_.back().interval_s);
   if (!start) return std::nullopt;
@@ -389,7 +383,7 @@ std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, co
     end();
     return std::nullopt;
   }
-  start->is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
+  start->is_refinement = is_refinement;
   takeOver(reading, &*start);
   is_settled_ |= reading.lead > kSettlingLead && reading.parallax_px > kSettlingParallaxPx;
   last_parallax_px_ = reading.parallax_px;
@@ -403,6 +397,7 @@ void StartAdjustment::takeOver(const Reading& reading, AdjustedStart* start) {
                             reading.bundle.cameras[k].poseWorldCamera()});
     images_[k].camera = reading.bundle.cameras[k];
   }
+  adjusted_ = reading.ids;
   auto feature = features_.begin();
   for (std::size_t i = 0; i < reading.ids.size(); ++i) {
     while (feature->id != reading.ids[i]) ++feature;  // both ascend

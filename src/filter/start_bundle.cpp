@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <utility>
 
-#include "active_matching_slam/filter/match_noise.h"
 #include "active_matching_slam/filter/quantile.h"
+#include "bundle_equations.h"
 #include "start_readings.h"
 
 namespace active_matching_slam {
@@ -14,10 +14,8 @@ namespace {
 
 /// Prior of depths in the end, by how far apart they turned out to be (median).
 constexpr double kDepthSpread = 3.5;
-constexpr double kOutlierSigmas = 2.5, kLeastOutlierPx = 0.12;
-/// What an adjustment takes for the noise of image points, by what they show (by NEES over rendered
-/// runs), and at least.
-constexpr double kShareOfNoise = 1.1, kLeastNoisePx = 0.005;
+constexpr double kOutlierSigmas = 2.0, kLeastOutlierPx = 0.03;
+constexpr double kLeastNoisePx = 0.005;  ///< of image points
 /// No image point counts for more than so many times what features miss on the whole (median).
 constexpr double kMostMiss = 3.0;
 /// Points for which an image is taken to be as noisy as most.
@@ -80,7 +78,7 @@ BundleOptions startOptions(const FilterOptions& filter) {
   BundleOptions options;
   options.outlier_px = kOutlierSigmas * filter.sigma_px;
   options.sigma_px = filter.sigma_px;
-  options.lasting_share = kLastingShare;
+  options.scale_by_scatter = true;
   options.inverse_depth = filter.initial_inverse_depth;
   options.sigma_inverse_depth = filter.initial_sigma_inverse_depth;
   options.minimum_inverse_depth = filter.minimum_inverse_depth;
@@ -103,18 +101,26 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
   // most image points are much better than that.
   options->outlier_px =
       std::clamp(kOutlierSigmas * noise_px, kLeastOutlierPx, kOutlierSigmas * options->sigma_px);
-  options->sigma_px =
-      std::min(options->sigma_px, std::max(kShareOfNoise * noise_px, kLeastNoisePx));
+  options->sigma_px = std::min(options->sigma_px, std::max(noise_px, kLeastNoisePx));
   adjustBundle(model, *options, reading);
   dropWanderers(model, options->outlier_px, reading, believed, ids);
 }
 
-double depthFactor(const Bundle& before, const Bundle& bundle) {
-  std::vector<double> logarithms;
+double depthFactor(const CameraModel& model, const BundleOptions& options, const Bundle& before,
+                   const Bundle& bundle) {
+  const Eigen::VectorXd shares = depthShares(linearise(model, options, bundle), bundle);
+  double logarithm = 0.0;
   for (std::size_t i = 0; i < bundle.features.size(); ++i)
-    logarithms.push_back(
-        std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth));
-  return std::exp(medianOf(std::move(logarithms)));
+    logarithm += shares[static_cast<Eigen::Index>(i)] *
+                 std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth);
+  return std::exp(logarithm);
+}
+
+double medianDepthFactor(const Bundle& before, const Bundle& bundle) {
+  std::vector<double> factors;
+  for (std::size_t i = 0; i < bundle.features.size(); ++i)
+    factors.push_back(bundle.features[i].inverse_depth / before.features[i].inverse_depth);
+  return medianOf(std::move(factors));
 }
 
 }  // namespace active_matching_slam

@@ -19,8 +19,12 @@ BundleOptions withDepthsOf(const Bundle& reading, BundleOptions options);
 void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* reading,
                       Bundle* believed, std::vector<FeatureId>* ids);
 
-/// The factor for lengths by which the median of the inverse depths stays. Both bundles have
+/// The factor for lengths by which the unit of bundleCovariance() stays. Both bundles have
 /// the same features.
-double depthFactor(const Bundle& before, const Bundle& bundle);
+double depthFactor(const CameraModel& model, const BundleOptions& options, const Bundle& before,
+                   const Bundle& bundle);
+
+/// The factor for lengths by which the median of the depths stays.
+double medianDepthFactor(const Bundle& before, const Bundle& bundle);
 
 }  // namespace active_matching_slam

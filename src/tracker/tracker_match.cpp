@@ -31,6 +31,9 @@ constexpr double kShareOfRest = 0.5;       ///< for each opinion but the last, w
 constexpr double kAgreementChi2 = 13.8;    ///< 99.9 % of 2 degrees of freedom
 constexpr double kMostLogFalseAlarms = -1.0;
 constexpr double kLeastNoiseLeft = 0.1;  ///< of a match's variance, for what is left to tell it
+/// FeatureMeasurement::repetitions of matches that the start's adjustment will hear again: what it
+/// learns from them the filter need not.
+constexpr double kLearntByAdjustment = 1000.0;
 /// Share of its velocity that a camera keeps from one frame without matches to the next: a hand
 /// that jerks does not go on for long.
 constexpr double kSlowingUnseen = 0.7;
@@ -293,6 +296,7 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
     match.sigma_px = match_noise_.sigma_px(options_.filter, feature.noise);
     // A known point lies where it was said to, whatever its first images showed.
     if (!feature.known) match.repetitions = match_noise_.repetitions();
+    if (start_adjustment_.adjusts(match.id)) match.repetitions = kLearntByAdjustment;
   }
   fused_ = std::move(fused);
 

@@ -98,6 +98,10 @@ TEST(Consistency, AtALowFrameRateRepeatedLinearisationIsMoreAccurate) {
   EXPECT_LT(run(repeated).rms_position_m, 0.95 * run(once).rms_position_m);
 }
 
+/// What the start errs by is the run's to its end: it takes more runs to tell what NEES is on the
+/// whole. It is to lie in the bounds of kRuns.
+constexpr int kFreeRuns = 100;
+
 /// With free scale a run is judged in its own unit: truth is scaled by the factor that fits the
 /// whole track best.
 struct FreeRun {
@@ -150,9 +154,9 @@ TEST_P(FreeScale, TrackAndCovarianceHoldFromTheFirstImageOn) {
   const int frames = static_cast<int>(options.seconds * options.rate_hz);
   std::vector<double> nees(frames, 0.0);
   double worst = 0.0;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kFreeRuns; ++run) {
     const FreeRun result = runFree(options, 1000 + run);
-    for (int frame = 0; frame < frames; ++frame) nees[frame] += result.nees[frame] / kRuns;
+    for (int frame = 0; frame < frames; ++frame) nees[frame] += result.nees[frame] / kFreeRuns;
     worst = std::max(worst, result.rms_m / result.path_m);
     EXPECT_GT(result.scale, 0.65) << run;
     EXPECT_LT(result.scale, 1.4) << run;
@@ -165,8 +169,7 @@ TEST_P(FreeScale, TrackAndCovarianceHoldFromTheFirstImageOn) {
   std::cout << "speed " << GetParam() << ": NEES within bounds "
             << static_cast<double>(within) / frames << ", worst error " << 100.0 * worst
             << " % of the path\n";
-  // A start takes less noise than its points show, as suits images; here it is white.
-  EXPECT_GE(static_cast<double>(within), 0.8 * frames);
+  EXPECT_GE(static_cast<double>(within), 0.9 * frames);
 }
 
 INSTANTIATE_TEST_SUITE_P(SlowAndJerky, FreeScale, testing::Values(0.5, 2.0));

@@ -123,7 +123,24 @@ int doubtStrays(const Eigen::VectorXd& innovation, const Eigen::MatrixXd& S, Eig
   return strays;
 }
 
-TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
+/// By what impulses of unit covariance move the error state, from what predict() adds for them.
+Eigen::MatrixXd impulseRoot(const Ekf& before, double interval_s) {
+  Ekf moved = before, nearly_free = before;
+  FilterOptions options = before.options();
+  const double V =
+      std::pow(options.sigma_acceleration_mps2 * interval_s, 2) - std::pow(0.001 * interval_s, 2);
+  options.sigma_acceleration_mps2 = options.sigma_angular_acceleration_rps2 = 0.001;
+  nearly_free.setOptions(options);
+  moved.predict(interval_s);
+  nearly_free.predict(interval_s);
+  const Eigen::MatrixXd added = moved.covariance() - nearly_free.covariance();
+  Eigen::MatrixXd G(added.rows(), 6);  // an impulse is what the velocity gains
+  G << added.middleCols<3>(CameraError::kVelocity),
+      added.middleCols<3>(CameraError::kAngularVelocity);
+  return G / V * before.options().sigma_acceleration_mps2 * interval_s;
+}
+
+TEST_F(EkfUpdate, EqualsTheRestByErrorsThatLastAndThenTheImpulseByThoseOfAnImage) {
   int strays = 0;
   for (const unsigned seed : {1u, 2u, 3u}) {
     Ekf filter =
@@ -138,6 +155,8 @@ TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
     if (seed != 2u)
       for (std::size_t i = 0; i < measurements.size(); ++i)
         measurements[i].repetitions = 1.0 + 3.0 * i;
+    const Eigen::MatrixXd G = impulseRoot(filter, 0.01);
+    filter.predict(0.01);
     const Ekf before = filter;
     const UpdateReport report = filter.update(model_, measurements);
     ASSERT_TRUE(report.healthy);
@@ -158,26 +177,29 @@ TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
           measurements[i].pixel - seenBy(before, model_, *before.find(ids[i]))->pixel;
     }
     strays += doubtStrays(innovation, S_before, &R);
-    const Eigen::MatrixXd S = H * P * H.transpose() + R;
-    // The camera's motion by the noise of the image, the rest by that of errors that last.
+    // What was there before the impulse, by errors that last; the impulse, given that, by R alone.
     Eigen::MatrixXd lasting = Eigen::MatrixXd::Zero(rows, rows);
     for (std::size_t i = 0; i < ids.size(); ++i) {
       const double sigma_px = i == 1 ? 2.5 : once.sigma_px;
       lasting.diagonal().segment<2>(2 * i).setConstant((measurements[i].repetitions - 1.0) *
                                                        sigma_px * sigma_px);
     }
-    Eigen::MatrixXd K = P * H.transpose() * (S + lasting).inverse();
-    Eigen::MatrixXd of_rest = K;
-    of_rest.topRows<CameraError::kMotionSize>().setZero();
-    K.topRows<CameraError::kMotionSize>() =
-        (P * H.transpose() * S.inverse()).topRows<CameraError::kMotionSize>();
-    const Eigen::VectorXd delta = K * innovation;
+    const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(n, n), B = H * G;
+    const Eigen::MatrixXd P_rest = P - G * G.transpose();
+    const Eigen::MatrixXd N = B * B.transpose() + R;
+    const Eigen::MatrixXd K_rest =
+        P_rest * H.transpose() * (H * P_rest * H.transpose() + N + lasting).inverse();
+    const Eigen::MatrixXd P_then = (I - K_rest * H) * P_rest * (I - K_rest * H).transpose() +
+                                   K_rest * (N + lasting) * K_rest.transpose();
+    const Eigen::MatrixXd GK = G * B.transpose() * N.inverse();
+    const Eigen::VectorXd rest = K_rest * innovation;
+    const Eigen::VectorXd delta = rest + GK * (innovation - H * rest);
+    const Eigen::MatrixXd T = I - GK * H;
+    const Eigen::MatrixXd joint = T * P_then * T.transpose() +
+                                  (G - GK * B) * (G - GK * B).transpose() + GK * R * GK.transpose();
     CameraState camera = before.camera();
     std::vector<FeatureState> features = before.features();
     applyError(delta, camera, features);
-    const Eigen::MatrixXd IKH = Eigen::MatrixXd::Identity(n, n) - K * H;
-    const Eigen::MatrixXd joseph =
-        IKH * P * IKH.transpose() + K * R * K.transpose() + of_rest * lasting * of_rest.transpose();
     CovarianceMatrix prior;
     prior.reset(n);
     prior.view() = P;
@@ -186,7 +208,7 @@ TEST_F(EkfUpdate, EqualsTheJosephFormFollowedByTheTransportOfTheGauge) {
                                    gaugeGenerators(before.camera(), before.features(), n);
     const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(n, n) + change * L.transpose();
 
-    EXPECT_LT(relativeDifference(filter.covariance(), M * joseph * M.transpose()), 1e-10);
+    EXPECT_LT(relativeDifference(filter.covariance(), M * joint * M.transpose()), 1e-10);
     EXPECT_LT(errorBetween(camera, features, filter.camera(), filter.features(), n).norm(), 1e-10);
     EXPECT_NEAR(report.nis, innovation.dot(S_before.inverse() * innovation), 1e-8 * report.nis);
   }

@@ -28,9 +28,6 @@ struct Bundle {
   std::vector<FeatureState> features;
   std::vector<std::vector<BundleObservation>> observations;  ///< one list a camera
   CalibrationVector calibration = CalibrationVector::Zero();
-  /// Of each image: correlation of errors that last with those in the image before. One an image
-  /// where BundleOptions::lasting_share is not 0.
-  std::vector<double> persistence;
 };
 
 struct BundleOptions {
@@ -40,9 +37,8 @@ struct BundleOptions {
   double sigma_inverse_depth = 0.5;  ///< and its standard deviation
   double minimum_inverse_depth = 1e-4;
   CalibrationVector sigma_calibration = CalibrationVector::Zero();  ///< prior, about zero
-  /// Of the variance of image points, the share that lasts from image to image
-  /// (Bundle::persistence) once a feature has been seen again: for bundleCovariance().
-  double lasting_share = 0.0;
+  /// Whether bundleCovariance() is as large as what the features show, whatever `sigma_px`.
+  bool scale_by_scatter = false;
   int max_iterations = 20;
   double least_gain = 1e-4;  ///< relative fall of the cost that is worth a step more
   /// Ends where steps like the last, as many as are left, would not bring the cost below.
@@ -65,8 +61,12 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
 /// Covariance at a minimum, first order, of the cameras from `first_camera` on (position and
 /// rotation, 6 each, as in CameraError), of the calibration and then of all features (bearing and
 /// inverse depth, 3 each). Of the lens nothing is learnt: it is as uncertain as before and makes
-/// the rest so (a consider parameter; Schmidt 1966). The unit of length is that in which the mean
-/// logarithm of the inverse depths is what it is, to `relative_scale_sigma`.
+/// the rest so (a consider parameter; Schmidt 1966). With `scale_by_scatter` the noise of image
+/// points is what makes the last camera as uncertain as it would move, on the whole, if one feature
+/// or another were left out: the jackknife over clusters, in which errors may last from image to
+/// image (Cameron and Miller 2015, A Practitioner's Guide to Cluster-Robust Inference). The unit of
+/// length is that in which the mean logarithm of the inverse depths, weighted by what each would
+/// tell if the cameras were known, is what it is, to `relative_scale_sigma`.
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera,
                                  double relative_scale_sigma);

@@ -26,8 +26,8 @@ struct FeatureMeasurement {
   FeatureId id = -1;
   Eigen::Vector2d pixel;
   double sigma_px = 0.0;  ///< per axis; 0: FilterOptions::sigma_px
-  /// Images that share its error, at least 1: map and calibration, which remember, are told of it
-  /// as of white noise of so many times the variance.
+  /// Images that share its error, at least 1: all that was before the image, which remembers, is
+  /// told of it as of white noise of so many times the variance.
   double repetitions = 1.0;
 };
 
@@ -99,11 +99,11 @@ class Ekf {
       const CameraModel& camera, const std::vector<FeatureId>& ids,
       const std::optional<Accelerations>& instead = std::nullopt) const;
   /// Corrects the state. All measurements are fused at once. Errors of matches last for some images
-  /// (FeatureMeasurement::repetitions): the camera's motion, which is anew in each image, is
-  /// corrected by the gain of an image's noise, the rest by that of the noise that lasts, and the
-  /// covariance is that of these gains (Joseph's form). Of the calibration's correction only
-  /// FilterOptions::calibration_share is made, and its covariance says so: a partial update (Brink
-  /// 2017, Partial-Update Schmidt-Kalman Filter).
+  /// (FeatureMeasurement::repetitions): the map, the calibration and what was known of the camera
+  /// before are corrected by the noise that lasts; once these are known, the impulse of the last
+  /// predict(), which is anew in each image, by that of one image. Of the calibration's correction
+  /// only FilterOptions::calibration_share is made, and its covariance says so: a partial update
+  /// (Brink 2017, Partial-Update Schmidt-Kalman Filter).
   UpdateReport update(const CameraModel& camera,
                       const std::vector<FeatureMeasurement>& measurements);
 
@@ -137,12 +137,12 @@ class Ekf {
   FeatureState& appendFeature(FeatureKind kind);
   void assignOffsets();
   void limitInverseDepths();
-  /// P <- M (P - X X^T - D) M^T with M = I + C L^T, the transport of the gauge: C is the change of
-  /// its generators, L its functionals, PL = P L; the motion's rows of D are `more`, the rest is
-  /// zero but for symmetry. X: the first `columns` columns of `X`, which has kGaugeFreedoms to
-  /// spare. False when variances had to be repaired.
+  /// P <- M (P - X X^T + D) M^T with M = I + C L^T, the transport of the gauge: C is the change of
+  /// its generators, L its functionals, PL = P L; D is `added` for the motion and else zero. X: the
+  /// first `columns` columns of `X`, which has kGaugeFreedoms to spare. False when variances had to
+  /// be repaired.
   bool correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
-                         const Eigen::MatrixXd& PL, const Eigen::MatrixXd& more, int columns,
+                         const Eigen::MatrixXd& PL, const MotionCovariance& added, int columns,
                          Eigen::Ref<Eigen::MatrixXd> X);
   bool repairVariances(const Eigen::VectorXd& before);
 

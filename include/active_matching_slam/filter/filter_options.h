@@ -22,11 +22,11 @@ struct FilterOptions {
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
   double initial_sigma_readout_s = 0.01;
-  double initial_sigma_focal = 0.0004;  ///< these: see LensCorrection
-  double initial_sigma_radial = 0.002;
-  double initial_sigma_centre = 0.00025;
+  double initial_sigma_focal = 0.00004;  ///< these: see LensCorrection
+  double initial_sigma_radial = 0.0002;
+  double initial_sigma_centre = 0.000025;
   /// The lens's three are so many times as large where no distortion was calibrated.
-  double uncalibrated_factor = 5.0;
+  double uncalibrated_factor = 50.0;
   /// Of each correction of the calibration, how much is made: 1 where errors of matches are white;
   /// those of images last, and teach less than so many of them should. See Ekf::update().
   double calibration_share = 0.6;

@@ -7,14 +7,6 @@
 
 namespace active_matching_slam {
 
-/// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
-constexpr double kLastingShare = 0.5;
-
-/// Correlation of what lasts with that in the image before, for matches that moved by so much from
-/// there [px]. While they move on like this, its sum over all images is how many it takes until
-/// what lasts is another.
-double persistence(double motion_px);
-
 /// How much more or less noisy the matches of one feature are than most: some corners are cleaner
 /// than others, and where something near hides something far there is no point to be found. By what
 /// is left between image and template, and by what updates leave over about the last hundred
@@ -42,7 +34,7 @@ class FeatureNoise {
 };
 
 /// The noise of matches as updates show it: what they leave between matches and map, by its median
-/// (so that the few that are wrong don't count), averaged over half a second or so, and as much
+/// (so that the few that are wrong don't count), averaged over the last few images, and as much
 /// more or less as the present image is blurred or sharp: what is left between it and the templates
 /// tells so at once. It is for the update only; gates and mutual information keep
 /// FilterOptions::sigma_px, which must hold for what has not been matched yet.

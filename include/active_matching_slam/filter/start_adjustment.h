@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -45,6 +46,10 @@ class StartAdjustment {
   bool isActive() const { return is_active_; }
   /// While nothing has been adjusted yet: the depths are a guess.
   bool areDepthsGuessed() const { return is_active_ && last_parallax_px_ == 0.0; }
+  /// Whether the feature took part when adjusted last, and will again.
+  bool adjusts(FeatureId id) const {
+    return is_active_ && std::binary_search(adjusted_.begin(), adjusted_.end(), id);
+  }
   /// While all that is seen has been seen from about the same place.
   bool areDepthsVague() const { return is_active_ && !has_left_first_; }
 
@@ -72,8 +77,7 @@ class StartAdjustment {
     std::vector<FeatureMeasurement> measurements;  ///< ascending id
     /// Speed [px/s] of each of them, by the images next to this one that show it; zero: none does.
     std::vector<Eigen::Vector2d> speeds;
-    double sigma_px = 0.0;     ///< of most of them; 0: unknown
-    double persistence = 0.0;  ///< see Bundle
+    double sigma_px = 0.0;  ///< of most of them; 0: unknown
   };
 
   enum class Adjusted { kSomeImages, kAllImages, kAllByTheirNoise };
@@ -112,9 +116,10 @@ class StartAdjustment {
   std::vector<Image> images_;  ///< the first, some between, the last two
   /// Ascending id: those of the filter, and what has left it but is in the images.
   std::vector<FeatureState> features_;
-  std::optional<Reading> chosen_;  ///< at the image before, for the next step
-  bool has_left_first_ = false;    ///< the last image shares too little with the first
-  bool is_settled_ = false;        ///< what the filter was given has no opposite any more
+  std::optional<Reading> chosen_;    ///< at the image before, for the next step
+  std::vector<FeatureId> adjusted_;  ///< features that took part when adjusted last, ascending
+  bool has_left_first_ = false;      ///< the last image shares too little with the first
+  bool is_settled_ = false;          ///< what the filter was given has no opposite any more
   double least_motion_px_ = 1.0;
   double last_parallax_px_ = 0.0;  ///< when adjusted last; zero: has not been
   double next_parallax_px_ = 0.0;  ///< to be adjusted at
