@@ -14,9 +14,9 @@ namespace {
 constexpr std::size_t kLeastMatches = 8;
 /// Of one update in the average, once there are many.
 constexpr double kLeastWeightShown = 0.6, kLeastWeightSeen = 0.05;
-/// The noise that matches are taken to have, in what updates show. (By NEES over rendered runs, as
-/// are the next.)
-constexpr double kShareOfShown = 0.95;
+/// The noise that matches are taken to have, but for their tails, in what updates show. (By NEES
+/// over rendered runs, as are the next.)
+constexpr double kShareOfShown = 0.75;
 /// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
 constexpr double kLastingShare = 0.5;
 /// Motion of the image after which what lasts is another, and the most images that are taken to
@@ -24,8 +24,9 @@ constexpr double kLastingShare = 0.5;
 constexpr double kFreshPx = 5.0, kMostSameImages = 15.0;
 /// Power of what images tell by which corners wander more. (By the same.)
 constexpr double kWanderByMisfit = 2.0;
-constexpr double kSharpest = 0.2, kMostBlurred = 5.0;  ///< image, in what most tell
-constexpr double kSigmaByMedian = 1.4826;              ///< of a Gaussian's absolute values
+constexpr double kLeastWander = 0.7, kMostWander = 10.0;  ///< of a corner, in that of most
+constexpr double kSharpest = 0.2, kMostBlurred = 5.0;     ///< image, in what most tell
+constexpr double kSigmaByMedian = 1.4826;                 ///< of a Gaussian's absolute values
 
 constexpr double kSightWeight = 0.1;  ///< of one match in a feature's average, once there are many
 constexpr double kMemory = 0.99;      ///< of a feature's noise, a match
@@ -68,6 +69,10 @@ double MatchNoise::repetitions() const { return 1.0 + kLastingShare * (same_imag
 double MatchNoise::likeMost(const FeatureNoise& feature) const {
   if (!(feature.seen_px() > 0.0) || !(seen_px_ > 0.0)) return 1.0;
   return std::pow(feature.seen_px() / seen_px_, kWanderByMisfit);
+}
+
+double MatchNoise::wanderLikeMost(const FeatureNoise& feature) const {
+  return std::clamp(feature.factor() * likeMost(feature), kLeastWander, kMostWander);
 }
 
 double MatchNoise::sigma_px(const FilterOptions& options) const {

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "active_matching_slam/filter/state_error.h"
@@ -13,8 +14,11 @@ namespace {
 constexpr int kMotion = CameraError::kMotionSize;
 /// Linearisation is repeated when it missed by more than this, root mean square, in sigmas.
 constexpr double kNonlinearityTolerance = 0.2;
-/// A measurement's squared distance from what all others say of it, in sigmas; of 2 expected.
-constexpr double kStrayChi2 = 9.0;
+/// Of the t distribution of what matches are off by: degrees of freedom, and the variance in that
+/// of Gaussian noise for which the covariance is right if the noise is Gaussian after all.
+constexpr double kTailDegrees = 4.0, kTailVariance = 1.18;
+constexpr double kTailTolerance = 0.02;  ///< of the variances
+constexpr int kMostTailRounds = 4;
 
 }  // namespace
 
@@ -91,43 +95,52 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> MeasurementUpdate::impulseGain(
 }
 
 /// `weighted`: S^-1 y for the innovation y. Of what the others leave of y_i, the covariance is the
-/// inverse of that block of S^-1, and itself that times the block of S^-1 y. Whether there are any.
-bool MeasurementUpdate::doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S) {
+/// inverse of that block of S^-1, and itself that times the block of S^-1 y. `variances_px2` are as
+/// expected, those of the measurements as found so far. Whether they, and S, have changed.
+bool MeasurementUpdate::weighTails(const Eigen::VectorXd& weighted,
+                                   const std::vector<double>& variances_px2, Eigen::MatrixXd& S) {
   const Eigen::MatrixXd inverse_root = inverseRoot(llt_);
   bool any = false;
   noise_left_.clear();
   for (Eigen::Index i = 0; i < weighted.size() / 2; ++i) {
     const auto columns = inverse_root.block(2 * i, 2 * i, weighted.size() - 2 * i, 2);
-    Eigen::Matrix2d inverse = columns.transpose() * columns;  // block of S^-1
-    const Eigen::Matrix2d left_out = inverse.inverse();
-    const Eigen::Vector2d w = weighted.segment<2>(2 * i);
-    const double chi2 = w.dot(left_out * w);
-    if (chi2 > kStrayChi2) {
-      const double more_px2 = 0.5 * left_out.trace() * (chi2 / kStrayChi2 - 1.0);
-      measurements_[i].variance_px2 += more_px2;
-      S.block<2, 2>(2 * i, 2 * i).diagonal().array() += more_px2;
-      inverse = (left_out + more_px2 * Eigen::Matrix2d::Identity()).inverse();
-      any = true;
-    }
+    const Eigen::Matrix2d left_out = (columns.transpose() * columns).inverse();
+    const double expected_px2 = variances_px2[i], found_px2 = measurements_[i].variance_px2;
+    const Eigen::Matrix2d expected =
+        left_out - (found_px2 - expected_px2) * Eigen::Matrix2d::Identity();
+    const Eigen::Vector2d left = left_out * weighted.segment<2>(2 * i);
+    const double chi2 = left.dot(expected.inverse() * left);
+    const double factor = kTailVariance * (kTailDegrees + chi2) / (kTailDegrees + 2.0);
+    const double change_px2 = factor * expected_px2 - found_px2;
+    any |= std::abs(change_px2) > kTailTolerance * found_px2;
+    measurements_[i].variance_px2 += change_px2;
+    S.block<2, 2>(2 * i, 2 * i).diagonal().array() += change_px2;
     // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
-    noise_left_.push_back(0.5 * measurements_[i].variance_px2 * inverse.trace());
+    noise_left_.push_back(0.5 * measurements_[i].variance_px2 *
+                          (left_out + change_px2 * Eigen::Matrix2d::Identity()).inverse().trace());
   }
   return any;
 }
 
-/// How far off each measurement is, by the first innovation and the S of the noise expected, which
+/// How noisy each measurement is, by the first innovation and the S of the noise expected, which
 /// then is that of the noise found. False when S could not be factorised.
 bool MeasurementUpdate::judgeNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S) {
-  const auto weigh = [&](Eigen::VectorXd* weighted) {
+  Eigen::VectorXd weighted;
+  const auto weigh = [&] {
     llt_.compute(S);
     if (llt_.info() != Eigen::Success) return false;
-    *weighted = llt_.solve(innovation);
+    weighted = llt_.solve(innovation);
     return true;
   };
-  Eigen::VectorXd weighted;
-  if (!weigh(&weighted)) return false;
+  if (!weigh()) return false;
   nis_ = innovation.dot(weighted);
-  if (doubtStrays(weighted, S) && !weigh(&weighted)) return false;
+  std::vector<double> variances_px2;
+  for (const UsableMeasurement& m : measurements_) variances_px2.push_back(m.variance_px2);
+  for (int round = 0; round < kMostTailRounds; ++round) {
+    const bool has_changed = weighTails(weighted, variances_px2, S);
+    if (!weigh()) return false;
+    if (!has_changed) break;
+  }
   left_px_.clear();
   for (std::size_t i = 0; i < measurements_.size(); ++i)
     left_px_.push_back(measurements_[i].variance_px2 * weighted.segment<2>(2 * i));

@@ -21,9 +21,10 @@ using ImpulseRoot = Eigen::Matrix<double, CameraError::kMotionSize, 6>;
 
 /// The gain of one update, by repeated linearisation (Bell & Cathey 1993), with the noise of what
 /// linearisation leaves out and of errors that last; the impulse since the image before, once the
-/// rest is known so, with the noise of one image. A measurement
-/// that disagrees with all others is taken to have the noise with which it would not: matches are
-/// more often far off than a Gaussian's. All errors count from the prior mean; the Jacobian of an
+/// rest is known so, with the noise of one image. Matches are
+/// more often far off than a Gaussian's: each has the variance that an error of the t distribution
+/// which is as large as what it and all others disagree by is weighed with (Lange, Little & Taylor
+/// 1989). All errors count from the prior mean; the Jacobian of an
 /// iteration is that of the mean reached. The second-order noise stays the prior's: shrunk along
 /// with the posterior it trusted the wrong one of two explanations of a small first move, depths
 /// reversed, for good.
@@ -60,14 +61,15 @@ class MeasurementUpdate {
   void addNoise(Eigen::MatrixXd& S);
   bool judgeNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S);
   Eigen::Matrix<double, 6, Eigen::Dynamic> impulseGain(const Eigen::MatrixXd& B) const;
-  bool doubtStrays(const Eigen::VectorXd& weighted, Eigen::MatrixXd& S);
+  bool weighTails(const Eigen::VectorXd& weighted, const std::vector<double>& variances_px2,
+                  Eigen::MatrixXd& S);
   bool isLinearEnough(const Eigen::VectorXd& expected_pixels) const;
 
   const CameraModel& model_;
   const CameraState& prior_camera_;
   const std::vector<FeatureState>& prior_features_;
   const CovarianceMatrix& covariance_;
-  std::vector<UsableMeasurement> measurements_;  ///< strays with the noise that they are given
+  std::vector<UsableMeasurement> measurements_;  ///< with the noise that is found
   const double calibration_share_;
   const ImpulseRoot impulse_;
   Eigen::Ref<Eigen::MatrixXd> X_;  ///< gain times S, at the end gain times U, where U U^T = S

@@ -58,7 +58,13 @@ void Tracker::Implementation::predict(double interval_s) {
   }
   interval_s = std::min(interval_s, options_.max_frame_interval_s);
   filter_.predict(interval_s);
-  filter_.letCornersWander(camera_, interval_s);
+  std::vector<double> wander;
+  for (const FeatureState& state : filter_.features()) {
+    const MapFeature& feature = *map_.find(state.id);
+    // What is known holds the scale: no more of that is let go than of others.
+    wander.push_back(feature.known ? 1.0 : match_noise_.wanderLikeMost(feature.noise));
+  }
+  filter_.letCornersWander(camera_, interval_s, wander);
 }
 
 /// Predicts what should be seen and prepares the search for it.

@@ -108,6 +108,32 @@ TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
   EXPECT_GT(rays, 0);
 }
 
+TEST_F(EkfMap, CornersWanderByAsMuchMoreAsIsSaidOfEach) {
+  Ekf before = exampleFilter(model_, 3);
+  before.addPointFeature(before.camera().poseWorldCamera() * Eigen::Vector3d(0.3, -0.2, 1.5),
+                         1e-4 * Eigen::Matrix3d::Identity());
+  FilterOptions options = exampleOptions();
+  options.corner_wander_px = 2.0;
+  before.setOptions(options);
+  Ekf alike = before, apart = before;
+  std::vector<double> in_that_of_most;
+  for (std::size_t i = 0; i < before.features().size(); ++i) in_that_of_most.push_back(0.5 + i);
+  alike.letCornersWander(model_, 1e-4);
+  apart.letCornersWander(model_, 1e-4, in_that_of_most);
+  for (std::size_t i = 0; i < before.features().size(); ++i) {
+    const FeatureState& feature = before.features()[i];
+    const auto growth = [&](const Ekf& filter) {
+      return (filter.covariance() - before.covariance())
+          .diagonal()
+          .segment(feature.offset, feature.size())
+          .sum();
+    };
+    ASSERT_GT(growth(alike), 0.0);
+    const double square = in_that_of_most[i] * in_that_of_most[i];
+    EXPECT_NEAR(growth(apart), square * growth(alike), 1e-6 * growth(apart)) << i;
+  }
+}
+
 TEST_F(EkfMap, ANewFeatureIsPredictedWhereItWasSeenWhateverItsDepth) {
   // A doubtful row would add its place times the doubtful depth, a term of second order.
   FilterOptions options = exampleOptions();

@@ -73,8 +73,10 @@ class Ekf {
 
   /// Where a corner lies in its patch depends on the view of it, and the map follows: as that
   /// turned in the last `interval_s`, each feature moved at random across its ray from the camera,
-  /// a random walk of FilterOptions::corner_wander_px for a radian. After predict(interval_s).
-  void letCornersWander(const CameraModel& camera, double interval_s);
+  /// a random walk of FilterOptions::corner_wander_px for a radian, times what `in_that_of_most`
+  /// says of each of features(); empty: all are like most. After predict(interval_s).
+  void letCornersWander(const CameraModel& camera, double interval_s,
+                        const std::vector<double>& in_that_of_most = {});
 
   /// The camera may have slowed down: it keeps a share of its velocities, 0 to 1; what they lose is
   /// one standard deviation more of them.

@@ -67,6 +67,11 @@ class MatchNoise {
   /// most, the patch is not the plane that it is taken for, and wanders by more than that.
   double likeMost(const FeatureNoise& feature) const;
 
+  /// By how much more or less than most a corner wanders as the view of it turns: in proportion to
+  /// its matches' noise, as rendered scenes have it, but that one which looks clean hardly wanders
+  /// is not counted upon.
+  double wanderLikeMost(const FeatureNoise& feature) const;
+
   /// Standard deviation per axis [px] for most matches, not above FilterOptions::sigma_px and,
   /// where that allows it, not below FilterOptions::minimum_sigma_px.
   double sigma_px(const FilterOptions& options) const;
