@@ -71,8 +71,12 @@ double MatchNoise::likeMost(const FeatureNoise& feature) const {
   return std::pow(feature.seen_px() / seen_px_, kWanderByMisfit);
 }
 
+double MatchNoise::inThatOfMost(const FeatureNoise& feature) const {
+  return feature.factor() * likeMost(feature);
+}
+
 double MatchNoise::wanderLikeMost(const FeatureNoise& feature) const {
-  return std::clamp(feature.factor() * likeMost(feature), kLeastWander, kMostWander);
+  return std::clamp(inThatOfMost(feature), kLeastWander, kMostWander);
 }
 
 double MatchNoise::sigma_px(const FilterOptions& options) const {
@@ -83,7 +87,7 @@ double MatchNoise::sigma_px(const FilterOptions& options) const {
 
 double MatchNoise::sigma_px(const FilterOptions& options, const FeatureNoise& feature) const {
   return std::max(std::min(options.sigma_px, options.minimum_sigma_px),
-                  feature.factor() * likeMost(feature) * sigma_px(options));
+                  inThatOfMost(feature) * sigma_px(options));
 }
 
 void FeatureNoise::see(double sigma_px) {

@@ -103,8 +103,7 @@ bool MeasurementUpdate::weighTails(const Eigen::VectorXd& weighted,
   bool any = false;
   noise_left_.clear();
   for (Eigen::Index i = 0; i < weighted.size() / 2; ++i) {
-    const auto columns = inverse_root.block(2 * i, 2 * i, weighted.size() - 2 * i, 2);
-    const Eigen::Matrix2d left_out = (columns.transpose() * columns).inverse();
+    const Eigen::Matrix2d left_out = inverseBlock(inverse_root, i).inverse();
     const double expected_px2 = variances_px2[i], found_px2 = measurements_[i].variance_px2;
     const Eigen::Matrix2d expected =
         left_out - (found_px2 - expected_px2) * Eigen::Matrix2d::Identity();

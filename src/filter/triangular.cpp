@@ -22,6 +22,11 @@ Eigen::MatrixXd inverseRoot(const Eigen::LLT<Eigen::MatrixXd>& llt) {
   return inverse;
 }
 
+Eigen::Matrix2d inverseBlock(const Eigen::MatrixXd& inverse_root, Eigen::Index i) {
+  const auto columns = inverse_root.block(2 * i, 2 * i, inverse_root.rows() - 2 * i, 2);
+  return columns.transpose() * columns;
+}
+
 void timesTransposeOf(const Eigen::MatrixXd& L, Eigen::Ref<Eigen::MatrixXd> X) {
   for (Eigen::Index end = L.rows(); end > 0;) {
     const Eigen::Index columns = std::min(kColumns, end), k = end - columns;

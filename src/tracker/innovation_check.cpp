@@ -18,10 +18,7 @@ std::vector<int> agreeingMeasurements(const Eigen::VectorXd& innovation, const E
   const Eigen::MatrixXd root = inverseRoot(factor);  // L = root^T root
   Eigen::VectorXd y = factor.solve(innovation);
   std::vector<Eigen::Matrix2d> blocks;  // L_ii
-  for (int i = 0; i < n; ++i) {
-    const auto columns = root.block(2 * i, 2 * i, 2 * (n - i), 2);
-    blocks.emplace_back(columns.transpose() * columns);
-  }
+  for (int i = 0; i < n; ++i) blocks.push_back(inverseBlock(root, i));
   std::vector<int> kept(n);
   std::iota(kept.begin(), kept.end(), 0);
   // Marginalising a point out of S is a Schur complement in L, which becomes

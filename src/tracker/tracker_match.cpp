@@ -300,9 +300,11 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
     map_.seeNoise(match.id, match.sigma_px / match_noise_.ofImage());
     const MapFeature& feature = *map_.find(match.id);
     match.sigma_px = match_noise_.sigma_px(options_.filter, feature.noise);
-    // A known point lies where it was said to, whatever its first images showed.
-    if (!feature.known) match.repetitions = match_noise_.repetitions();
-    if (start_adjustment_.adjusts(match.id)) match.repetitions = kLearntByAdjustment;
+    if (start_adjustment_.adjusts(match.id)) {
+      match.repetitions = kLearntByAdjustment;
+    } else if (!feature.known) {  // it lies where it was said to, whatever its first images showed
+      match.repetitions = match_noise_.repetitions();
+    }
   }
   fused_ = std::move(fused);
 

@@ -69,13 +69,19 @@ TEST_F(EkfMap, PredictionOverNoTimeOrNonsenseChangesNothing) {
   }
 }
 
-TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
-  Ekf filter = exampleFilter(model_, 3);
+/// With rays and a point, by 2 px for the root of a radian.
+Ekf filterWhoseCornersWander(const CameraModel& model) {
+  Ekf filter = exampleFilter(model, 3);
   filter.addPointFeature(filter.camera().poseWorldCamera() * Eigen::Vector3d(0.3, -0.2, 1.5),
                          1e-4 * Eigen::Matrix3d::Identity());
   FilterOptions options = exampleOptions();
   options.corner_wander_px = 2.0;
   filter.setOptions(options);
+  return filter;
+}
+
+TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
+  Ekf filter = filterWhoseCornersWander(model_);
   const double dt = 1e-4;
   const Eigen::MatrixXd before = filter.covariance();
   filter.letCornersWander(model_, dt);
@@ -109,12 +115,7 @@ TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
 }
 
 TEST_F(EkfMap, CornersWanderByAsMuchMoreAsIsSaidOfEach) {
-  Ekf before = exampleFilter(model_, 3);
-  before.addPointFeature(before.camera().poseWorldCamera() * Eigen::Vector3d(0.3, -0.2, 1.5),
-                         1e-4 * Eigen::Matrix3d::Identity());
-  FilterOptions options = exampleOptions();
-  options.corner_wander_px = 2.0;
-  before.setOptions(options);
+  const Ekf before = filterWhoseCornersWander(model_);
   Ekf alike = before, apart = before;
   std::vector<double> in_that_of_most;
   for (std::size_t i = 0; i < before.features().size(); ++i) in_that_of_most.push_back(0.5 + i);

@@ -24,6 +24,13 @@ TEST(Triangular, InverseRootsMakeTheInverse) {
   }
 }
 
+TEST(Triangular, BlocksOfTheInverseAreThoseOfTheWhole) {
+  const Eigen::MatrixXd S = positiveDefinite(64), inverse = S.inverse();
+  const Eigen::MatrixXd root = inverseRoot(Eigen::LLT<Eigen::MatrixXd>(S));
+  for (const int i : {0, 7, 31})
+    EXPECT_LT((inverseBlock(root, i) - inverse.block<2, 2>(2 * i, 2 * i)).norm(), 1e-10) << i;
+}
+
 TEST(Triangular, MultipliesAsAPlainProductDoes) {
   for (const int n : kSizes) {
     const Eigen::MatrixXd L = Eigen::MatrixXd::Random(n, n).triangularView<Eigen::Lower>();

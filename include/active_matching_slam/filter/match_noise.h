@@ -79,6 +79,9 @@ class MatchNoise {
   double sigma_px(const FilterOptions& options, const FeatureNoise& feature) const;
 
  private:
+  /// Standard deviation of a feature's matches in that of most, by all that is known of it.
+  double inThatOfMost(const FeatureNoise& feature) const;
+
   double shown_px2_ = 0.0;  ///< average variance, in an image like most
   double seen_px_ = 0.0;    ///< average of what images tell of most matches; 0: nothing yet
   double of_image_ = 1.0;
