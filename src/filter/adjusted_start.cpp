@@ -49,13 +49,14 @@ Eigen::Isometry3d AdjustedStart::corrected(std::int64_t image,
 std::optional<AdjustedStart> makeAdjustedStart(const CameraModel& model, const Ekf& filter,
                                                const BundleOptions& options, const Bundle& bundle,
                                                const std::vector<FeatureId>& ids,
+                                               const Eigen::VectorXd& unit_shares,
                                                double interval_s) {
   const int last = static_cast<int>(bundle.cameras.size()) - 1;
   const double dt = interval_s;
   BundleOptions doubting_lens = options;
   doubting_lens.sigma_calibration = calibrationSigmas(filter.options());
   const Eigen::MatrixXd joint =
-      bundleCovariance(model, doubting_lens, bundle, last - 1, Ekf::kFreeScaleSigma);
+      bundleCovariance(model, doubting_lens, bundle, last - 1, unit_shares, Ekf::kFreeScaleSigma);
   if (joint.size() == 0 || !joint.allFinite() || !(dt > 0.0)) return std::nullopt;
 
   AdjustedStart start;

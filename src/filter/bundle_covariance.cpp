@@ -53,7 +53,7 @@ double scatterOfLastCamera(const CameraModel& model, const BundleOptions& option
 
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera,
-                                 double relative_scale_sigma) {
+                                 const Eigen::VectorXd& unit_shares, double relative_scale_sigma) {
   const NormalEquations N = linearise(model, options, bundle);
   const LensVector lens_information = calibrationInformation(options).tail<kLensSize>();
   const auto reduced = eliminateFeatures(N, 0.0, &lens_information);
@@ -84,9 +84,8 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   covariance *= scatter;
   // The unit is known as well as said: one more measurement.
   Eigen::VectorXd depths = Eigen::VectorXd::Zero(M.rows());
-  const Eigen::VectorXd shares = depthShares(N, bundle);
   for (int i = 0; i < F; ++i)
-    depths[kept + 3 * i + 2] = shares[i] / bundle.features[i].inverse_depth;
+    depths[kept + 3 * i + 2] = unit_shares[i] / bundle.features[i].inverse_depth;
   const Eigen::VectorXd along = lower * depths;
   const double variance = depths.dot(along);
   lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + variance));

@@ -25,8 +25,9 @@ struct LinearPoint {
   Matrix26 d_pose;
   Matrix23 d_feature;
   Eigen::Vector2d residual_px;
-  double squared_px2 = 0.0;  ///< squaredMiss()
-  double weight = 0.0;       ///< information [1/px^2]
+  double squared_px2 = 0.0;     ///< squaredMiss()
+  Eigen::Matrix2d information;  ///< [1/px^2]
+  double robust = 0.0;          ///< share of it that is left for what is off by so much
 };
 
 /// Empty when the feature does not project.
@@ -43,8 +44,8 @@ std::optional<LinearPoint> linearPoint(const CameraModel& model, const BundleOpt
   point.residual_px = plainPixel(bundle, o) - projection->pixel;
   point.squared_px2 = squaredMiss(o, point.residual_px);
   const double sigma_px = options.sigma_px * o.noise;
-  point.weight = 1.0 / (sigma_px * sigma_px) /
-                 (1.0 + point.squared_px2 / (options.outlier_px * options.outlier_px));
+  point.robust = 1.0 / (1.0 + point.squared_px2 / (options.outlier_px * options.outlier_px));
+  point.information = point.robust / (sigma_px * sigma_px) * o.inverse_shape;
   return point;
 }
 
@@ -104,16 +105,16 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
       }
       N.cost += robustCost(options, point->squared_px2);
       const Eigen::Vector2d& residual = point->residual_px;
-      const Matrix23 &J = point->d_feature, weighted_J = point->weight * J;
+      const Matrix23 &J = point->d_feature, weighted_J = point->information * J;
       N.features[o.feature].noalias() += J.transpose() * weighted_J;
       N.feature_gradient.segment<3>(3 * o.feature) += weighted_J.transpose() * residual;
       const auto& D = o.d_calibration;
-      const Eigen::Matrix<double, 2, kCalibrationSize> weighted_D = point->weight * D;
+      const Eigen::Matrix<double, 2, kCalibrationSize> weighted_D = point->information * D;
       calibration.noalias() += D.transpose() * weighted_D;
       N.camera_gradient.tail<kCalibrationSize>() += weighted_D.transpose() * residual;
       calibration_features.middleCols<3>(3 * o.feature).noalias() += D.transpose() * weighted_J;
       if (k == 0) continue;
-      const Matrix26 weighted_pose = point->weight * point->d_pose;
+      const Matrix26 weighted_pose = point->information * point->d_pose;
       pose.noalias() += point->d_pose.transpose() * weighted_pose;
       calibration_pose.noalias() += D.transpose() * weighted_pose;
       pose_gradient += weighted_pose.transpose() * residual;
@@ -130,7 +131,9 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
   return N;
 }
 
-Eigen::VectorXd depthShares(const NormalEquations& N, const Bundle& bundle) {
+Eigen::VectorXd depthShares(const CameraModel& model, const BundleOptions& options,
+                            const Bundle& bundle) {
+  const NormalEquations N = linearise(model, options, bundle);
   Eigen::VectorXd shares(bundle.features.size());
   for (Eigen::Index i = 0; i < shares.size(); ++i) {
     const double variance = N.features[i].inverse()(2, 2);
@@ -151,16 +154,14 @@ FeaturePulls pullsOfFeatures(const CameraModel& model, const BundleOptions& opti
     for (const BundleObservation& o : bundle.observations[k]) {
       const auto point = linearPoint(model, options, bundle, k, R, o);
       if (!point) continue;
-      const double sigma_px = options.sigma_px * o.noise;
-      const double robust = point->weight * sigma_px * sigma_px;
-      weights += robust;
-      slopes += robust * robust;
+      weights += point->robust;
+      slopes += point->robust * point->robust;
       Eigen::Matrix<double, kLastPoseSize, 2> J =
           map.col(readout) * o.d_calibration.col(0).transpose();
       if (k > 0) J += map.middleCols<6>(6 * static_cast<int>(k - 1)) * point->d_pose.transpose();
       FeaturePull& pull = pulls.features[o.feature];
-      pull.gradient += point->weight * (J * point->residual_px);
-      pull.information += point->weight * (J * J.transpose());
+      pull.gradient += J * (point->information * point->residual_px);
+      pull.information += J * point->information * J.transpose();
     }
   }
   for (std::size_t i = 0; i < bundle.features.size(); ++i) {

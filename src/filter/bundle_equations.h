@@ -48,10 +48,6 @@ struct CameraEquations {
 std::optional<CameraEquations> eliminateFeatures(const BundleMatrix& information, double damping,
                                                  const LensVector* lens_information = nullptr);
 
-/// What each feature tells of the logarithm of the unit of length, if the cameras were known:
-/// shares of 1.
-Eigen::VectorXd depthShares(const NormalEquations& N, const Bundle& bundle);
-
 /// Combinations of what the normal equations have of the cameras and of the readout.
 constexpr int kLastPoseSize = 5;
 using LastPoseMap = Eigen::Matrix<double, kLastPoseSize, Eigen::Dynamic>;
@@ -91,9 +87,9 @@ inline Eigen::Vector2d plainPixel(const Bundle& bundle, const BundleObservation&
   return o.pixel - o.d_calibration * bundle.calibration;
 }
 
-/// Of a residual [px], squared, as if the point were as noisy as most.
+/// Of a residual [px], squared, as if the point were as noisy as most, and so along both axes.
 inline double squaredMiss(const BundleObservation& o, const Eigen::Vector2d& residual_px) {
-  return residual_px.squaredNorm() / (o.noise * o.noise);
+  return residual_px.dot(o.inverse_shape * residual_px) / (o.noise * o.noise);
 }
 
 /// Calls visit(image, observation, squaredMiss) for all image points; infinite where the feature

@@ -60,7 +60,8 @@ UpdateReport Ekf::update(const CameraModel& camera,
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
     const double variance_px2 = sigma_px * sigma_px;
     usable.push_back({index, m.pixel, variance_px2,
-                      m.repetitions > 1.0 ? (m.repetitions - 1.0) * variance_px2 : 0.0});
+                      m.repetitions > 1.0 ? (m.repetitions - 1.0) * variance_px2 : 0.0,
+                      m.noise_shape});
     given.push_back(i);
   }
   report.skipped = static_cast<int>(measurements.size() - usable.size());

@@ -74,8 +74,7 @@ void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) {
     if (moments_[i](3, 3) > 0.0)
       second_order_[i] = secondOrderNoise(stack_.projection(i), moments_[i]);
     auto block = S.block<2, 2>(2 * i, 2 * i);
-    block += second_order_[i];
-    block.diagonal().array() += measurements_[i].variance_px2;
+    block += second_order_[i] + measurements_[i].variance_px2 * measurements_[i].shape;
   }
 }
 
@@ -86,7 +85,7 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> MeasurementUpdate::impulseGain(
   Eigen::Matrix<double, 6, Eigen::Dynamic> weighted = B.transpose();
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     const Eigen::Matrix2d R =
-        measurements_[i].variance_px2 * Eigen::Matrix2d::Identity() + second_order_[i];
+        measurements_[i].variance_px2 * measurements_[i].shape + second_order_[i];
     weighted.middleCols<2>(2 * i) = weighted.middleCols<2>(2 * i) * R.inverse();
   }
   const Eigen::Matrix<double, 6, 6> information =
@@ -103,20 +102,20 @@ bool MeasurementUpdate::weighTails(const Eigen::VectorXd& weighted,
   bool any = false;
   noise_left_.clear();
   for (Eigen::Index i = 0; i < weighted.size() / 2; ++i) {
+    const Eigen::Matrix2d& shape = measurements_[i].shape;
     const Eigen::Matrix2d left_out = inverseBlock(inverse_root, i).inverse();
     const double expected_px2 = variances_px2[i], found_px2 = measurements_[i].variance_px2;
-    const Eigen::Matrix2d expected =
-        left_out - (found_px2 - expected_px2) * Eigen::Matrix2d::Identity();
+    const Eigen::Matrix2d expected = left_out - (found_px2 - expected_px2) * shape;
     const Eigen::Vector2d left = left_out * weighted.segment<2>(2 * i);
     const double chi2 = left.dot(expected.inverse() * left);
     const double factor = kTailVariance * (kTailDegrees + chi2) / (kTailDegrees + 2.0);
     const double change_px2 = factor * expected_px2 - found_px2;
     any |= std::abs(change_px2) > kTailTolerance * found_px2;
     measurements_[i].variance_px2 += change_px2;
-    S.block<2, 2>(2 * i, 2 * i).diagonal().array() += change_px2;
+    S.block<2, 2>(2 * i, 2 * i) += change_px2 * shape;
     // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
     noise_left_.push_back(0.5 * measurements_[i].variance_px2 *
-                          (left_out + change_px2 * Eigen::Matrix2d::Identity()).inverse().trace());
+                          (shape * (left_out + change_px2 * shape).inverse()).trace());
   }
   return any;
 }
@@ -141,8 +140,11 @@ bool MeasurementUpdate::judgeNoise(const Eigen::VectorXd& innovation, Eigen::Mat
     if (!has_changed) break;
   }
   left_px_.clear();
-  for (std::size_t i = 0; i < measurements_.size(); ++i)
-    left_px_.push_back(measurements_[i].variance_px2 * weighted.segment<2>(2 * i));
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    const UsableMeasurement& m = measurements_[i];
+    const Eigen::Matrix2d root = m.shape.llt().matrixL();  // off which R S^-1 y is taken
+    left_px_.push_back(m.variance_px2 * (root.transpose() * weighted.segment<2>(2 * i)));
+  }
   return true;
 }
 
@@ -163,17 +165,17 @@ bool MeasurementUpdate::step(bool first) {
   }
   addNoise(S);
   if (first && !judgeNoise(innovation, S)) return false;
-  Eigen::VectorXd lasting_px2(2 * measurements_.size());
   for (std::size_t i = 0; i < measurements_.size(); ++i)
-    lasting_px2.segment<2>(2 * i).setConstant(measurements_[i].lasting_px2);
-  S.diagonal() += lasting_px2;
+    S.block<2, 2>(2 * i, 2 * i) += measurements_[i].lasting_px2 * measurements_[i].shape;
   llt_.compute(S);
   if (llt_.info() != Eigen::Success) return false;
   // With Q = G G^T the impulse's covariance and K its gain: what the rest leaves is fused by K. Put
   // together, the motion's rows of P H^T grow by G K L, for the lasting noise L, and its covariance
   // by G K L K^T G^T.
   const Eigen::Matrix<double, kMotion, Eigen::Dynamic> GK = impulse_ * impulseGain(B);
-  const Eigen::Matrix<double, kMotion, Eigen::Dynamic> more = GK * lasting_px2.asDiagonal();
+  Eigen::Matrix<double, kMotion, Eigen::Dynamic> more = GK;
+  for (std::size_t i = 0; i < measurements_.size(); ++i)
+    more.middleCols<2>(2 * i) *= measurements_[i].lasting_px2 * measurements_[i].shape;
   X_.topRows<kMotion>() += more;
   added_.noalias() = more * GK.transpose();
   delta_.noalias() = X_ * llt_.solve(innovation);

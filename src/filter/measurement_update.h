@@ -13,7 +13,8 @@ struct UsableMeasurement {
   int feature;  ///< index
   Eigen::Vector2d pixel;
   double variance_px2;
-  double lasting_px2;  ///< more of it, to all but the impulse
+  double lasting_px2;     ///< more of it, to all but the impulse
+  Eigen::Matrix2d shape;  ///< of both: FeatureMeasurement::noise_shape
 };
 
 /// By what impulses of unit covariance move the camera's motion (CameraError order).

@@ -32,6 +32,7 @@ constexpr double kRoughGain = 1e-2, kGainOnTheWay = 3e-3;
 constexpr int kStepsForOneMore = 2;  ///< once all but the last image are adjusted
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
+constexpr double kLeastOfUnit = 0.5;        ///< that is still seen of what told the unit of length
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
 constexpr double kSettlingLead = 20.0, kSettlingParallaxPx = 2.0;
@@ -122,6 +123,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
   features_.clear();
   adjusted_.clear();
+  unit_shares_.clear();
   has_left_first_ = is_settled_ = false;
   least_motion_px_ = 1.0;
   last_parallax_px_ = next_parallax_px_ = 0.0;
@@ -252,6 +254,7 @@ Bundle StartAdjustment::makeBundle(const CameraModel& model, std::vector<Feature
       if (it == ids->end() || *it != m.id) continue;
       BundleObservation o{static_cast<int>(it - ids->begin()), m.pixel};
       o.noise = of_features[o.feature];
+      o.inverse_shape = m.noise_shape.inverse();
       o.d_calibration << rowShare(model, m.pixel.y()) * image.speeds[i],
           model.pixelByCorrection(m.pixel);
       bundle.observations.back().push_back(o);
@@ -365,19 +368,40 @@ std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel
   return all;
 }
 
+/// What features count in the unit of length as it was when first adjusted. Empty when most of what
+/// counted is gone.
+Eigen::VectorXd StartAdjustment::unitShares(const std::vector<FeatureId>& ids) const {
+  Eigen::VectorXd shares = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(ids.size()));
+  auto known = unit_shares_.begin();
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    while (known != unit_shares_.end() && known->first < ids[i]) ++known;
+    if (known != unit_shares_.end() && known->first == ids[i])
+      shares[static_cast<Eigen::Index>(i)] = known->second;
+  }
+  const double sum = shares.sum();
+  return sum > kLeastOfUnit ? Eigen::VectorXd(shares / sum) : Eigen::VectorXd();
+}
+
 /// The filter's state by what was weighed, unless the filter knows more.
 std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, const Ekf& filter,
                                                     Weighed weighed) {
   Reading& reading = weighed.reading;
   const bool is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
-  // Others have seen the map: its unit of length stays. Of depths that were hardly known only the
-  // middle means something.
-  rescaleBundle(is_refinement
-                    ? depthFactor(model, weighed.options, weighed.believed, reading.bundle)
+  // The unit of length stays. Of depths that were guessed only the middle means something.
+  Eigen::VectorXd unit_shares = unitShares(reading.ids);
+  const bool has_unit = unit_shares.size() > 0;
+  if (!has_unit) {
+    unit_shares = depthShares(model, weighed.options, reading.bundle);
+    unit_shares_.clear();
+    for (std::size_t i = 0; i < reading.ids.size(); ++i)
+      unit_shares_.emplace_back(reading.ids[i], unit_shares[static_cast<Eigen::Index>(i)]);
+  }
+  rescaleBundle(has_unit || is_refinement
+                    ? depthFactor(unit_shares, weighed.believed, reading.bundle)
                     : medianDepthFactor(weighed.believed, reading.bundle),
                 &reading.bundle);
   auto start = makeAdjustedStart(model, filter, weighed.options, reading.bundle, reading.ids,
-                                 images_.back().interval_s);
+                                 unit_shares, images_.back().interval_s);
   if (!start) return std::nullopt;
   if (reading.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();

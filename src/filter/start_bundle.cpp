@@ -49,8 +49,10 @@ void dropWanderers(const CameraModel& model, double outlier_px, Bundle* bundle, 
   for (auto& observations : bundle->observations) {
     std::vector<BundleObservation> remaining;
     for (const BundleObservation& o : observations)
-      if (place[o.feature] >= 0)
-        remaining.push_back({place[o.feature], o.pixel, o.d_calibration, o.noise});
+      if (place[o.feature] >= 0) {
+        remaining.push_back(o);
+        remaining.back().feature = place[o.feature];
+      }
     observations.swap(remaining);
   }
 }
@@ -106,12 +108,10 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
   dropWanderers(model, options->outlier_px, reading, believed, ids);
 }
 
-double depthFactor(const CameraModel& model, const BundleOptions& options, const Bundle& before,
-                   const Bundle& bundle) {
-  const Eigen::VectorXd shares = depthShares(linearise(model, options, bundle), bundle);
+double depthFactor(const Eigen::VectorXd& unit_shares, const Bundle& before, const Bundle& bundle) {
   double logarithm = 0.0;
   for (std::size_t i = 0; i < bundle.features.size(); ++i)
-    logarithm += shares[static_cast<Eigen::Index>(i)] *
+    logarithm += unit_shares[static_cast<Eigen::Index>(i)] *
                  std::log(bundle.features[i].inverse_depth / before.features[i].inverse_depth);
   return std::exp(logarithm);
 }

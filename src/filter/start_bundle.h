@@ -21,8 +21,7 @@ void adjustByItsNoise(const CameraModel& model, BundleOptions* options, Bundle* 
 
 /// The factor for lengths by which the unit of bundleCovariance() stays. Both bundles have
 /// the same features.
-double depthFactor(const CameraModel& model, const BundleOptions& options, const Bundle& before,
-                   const Bundle& bundle);
+double depthFactor(const Eigen::VectorXd& unit_shares, const Bundle& before, const Bundle& bundle);
 
 /// The factor for lengths by which the median of the depths stays.
 double medianDepthFactor(const Bundle& before, const Bundle& bundle);

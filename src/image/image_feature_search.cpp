@@ -207,6 +207,7 @@ void ImageFeatureSearch::addMatch(Feature& feature, const Candidate& peak) {
   if (fit && (fit->pixel - middle).cwiseAbs().maxCoeff() <= kFarthestPeak) {
     match.pixel = fit->pixel;
     match.sigma_px = fit->sigma_px;
+    match.noise_shape = fit->noise_shape;
   }
   match.score = peak.score;
   match.id = static_cast<int>(feature.matches.size());

@@ -74,11 +74,12 @@ class NormalEquations {
     return solver.solve(right_);
   }
 
-  /// Of the shift per axis [px], at a solution x and for a template of variance `variance`.
-  double sigma(const Eigen::Vector4d& x, double variance) const {
+  /// The fit at `pixel`, with the solution x there and for a template of variance `variance`.
+  TemplateFit fit(const Eigen::Vector2d& pixel, const Eigen::Vector4d& x, double variance) const {
     const double left_over = std::max(0.0, pixels_ * variance - x.dot(right_)) / (pixels_ - 4);
-    const Eigen::Matrix4d inverse = left_.inverse();
-    return std::sqrt(0.5 * left_over * (inverse(1, 1) + inverse(2, 2))) / x[0];
+    const Eigen::Matrix2d shape = left_.inverse().block<2, 2>(1, 1);
+    const double mean = 0.5 * shape.trace();
+    return {pixel, std::sqrt(left_over * mean) / x[0], shape / mean};
   }
 
  private:
@@ -106,9 +107,9 @@ Eigen::Vector2d paraboloidPeak(const float s[9]) {
 
 std::optional<TemplateFit> refineSubpixel(const cv::Mat& image, const Template& patch,
                                           const Eigen::Vector2d& start) {
-  constexpr int kIterations = 10;
+  constexpr int kIterations = 20;
   // The error left after a step is a fraction of it.
-  constexpr double kConverged = 0.01, kLargestMove = 1.0;
+  constexpr double kConverged = 0.001, kLargestMove = 1.0;
   const int size = patch.size;
   if (size < 3 || patch.energy <= 0) return std::nullopt;
 
@@ -132,7 +133,7 @@ std::optional<TemplateFit> refineSubpixel(const cv::Mat& image, const Template& 
     pixel += step;
     if (!((pixel - start).norm() <= kLargestMove)) return std::nullopt;
     if (step.norm() < kConverged)
-      return TemplateFit{pixel, equations.sigma(*x, patch.contrast() * patch.contrast())};
+      return equations.fit(pixel, *x, patch.contrast() * patch.contrast());
   }
   return std::nullopt;
 }

@@ -278,20 +278,21 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
   }
   const int m = static_cast<int>(matched.size());
   Eigen::VectorXd innovation(2 * m);
-  std::vector<double> sigmas_px(m);
+  std::vector<const SearchMatch*> accepted(m);
   for (int a = 0; a < m; ++a) {
     const SearchMatch& match =
         search_.matches(matched[a])[frame->matching.match_of_feature[matched[a]]];
     innovation.segment<2>(2 * a) = match.pixel - prior_.mean(matched[a]);
-    sigmas_px[a] = match.sigma_px;
+    accepted[a] = &match;
   }
   const Eigen::MatrixXd S = selectFeatures(prior_.S, matched);
   std::vector<FeatureMeasurement> fused;
   std::vector<double> seen_px;
   for (int k : agreeingMeasurements(innovation, S, kAgreementChi2)) {
     const FeatureId id = prior_.ids[matched[k]];
-    fused.push_back({id, prior_.mean(matched[k]) + innovation.segment<2>(2 * k), sigmas_px[k]});
-    if (sigmas_px[k] > 0.0) seen_px.push_back(sigmas_px[k]);
+    const SearchMatch& match = *accepted[k];
+    fused.push_back({id, match.pixel, match.sigma_px, 1.0, match.noise_shape});
+    if (match.sigma_px > 0.0) seen_px.push_back(match.sigma_px);
   }
   match_noise_.see(std::move(seen_px));
   match_noise_.seeMotion(matchMotions(fused_, fused));

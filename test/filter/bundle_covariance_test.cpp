@@ -26,7 +26,8 @@ BundleOptions bundleOptions() {
   return options;
 }
 
-/// Image points are where they would be without noise, and answer to the calibration.
+/// Image points are where they would be without noise, answer to the calibration, and are known
+/// better along one axis than along the other.
 Bundle exactBundle(const CameraModel& model, int images, int features) {
   Bundle bundle = exampleBundle(model, images, features, 0.1, 0.0, 3);
   Random random(3);
@@ -34,6 +35,7 @@ Bundle exactBundle(const CameraModel& model, int images, int features) {
     for (BundleObservation& o : observations) {
       o.d_calibration.col(0) = Eigen::Vector2d(random.normal(100.0), random.normal(100.0));
       o.d_calibration.rightCols<4>() = model.pixelByCorrection(o.pixel);
+      o.inverse_shape << 2.0, 0.5, 0.5, 0.8;
     }
   }
   return bundle;
@@ -83,12 +85,23 @@ Eigen::VectorXd pixels(const CameraModel& model, const Bundle& b) {
   return Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
+/// Takes pairs of rows times the root of what their image points tell.
+void whiten(const Bundle& bundle, Eigen::MatrixXd* J) {
+  Eigen::Index row = 0;
+  for (const auto& observations : bundle.observations)
+    for (const BundleObservation& o : observations) {
+      const Eigen::Matrix2d root = o.inverse_shape.llt().matrixL();
+      J->middleRows<2>(row) = (root.transpose() * J->middleRows<2>(row)).eval();
+      row += 2;
+    }
+}
+
 Eigen::MatrixXd jacobian(const CameraModel& model, const Bundle& bundle) {
   const int size = Layout(bundle).size;
   Eigen::MatrixXd J(pixels(model, bundle).size(), size);
   for (int p = 0; p < size; ++p)
     J.col(p) =
-        (pixels(model, moved(bundle, p, 1e-6)) - pixels(model, moved(bundle, p, -1e-6))) / 2e-6;
+        (pixels(model, moved(bundle, p, 1e-5)) - pixels(model, moved(bundle, p, -1e-5))) / 2e-5;
   return J;
 }
 
@@ -125,7 +138,8 @@ TEST(BundleCovariance, IsThatOfThePlainFormula) {
   const Bundle bundle = exactBundle(model, 4, 12);
   const Layout layout(bundle);
   const int size = layout.size;
-  const Eigen::MatrixXd J = jacobian(model, bundle) / options.sigma_px;
+  Eigen::MatrixXd J = jacobian(model, bundle) / options.sigma_px;
+  whiten(bundle, &J);
   Eigen::MatrixXd information = J.transpose() * J;
   information.diagonal() += priorInformation(options, bundle);
   const Eigen::VectorXd unit = unitByParameters(bundle, information);
@@ -144,7 +158,8 @@ TEST(BundleCovariance, IsThatOfThePlainFormula) {
   information = lens_last * I * lens_last.transpose();
   const Eigen::MatrixXd plain =
       (information + unit * unit.transpose() / (kScaleSigma * kScaleSigma)).inverse();
-  const Eigen::MatrixXd covariance = bundleCovariance(model, options, bundle, 2, kScaleSigma);
+  const Eigen::MatrixXd covariance =
+      bundleCovariance(model, options, bundle, 2, depthShares(model, options, bundle), kScaleSigma);
   const int kept = size - 6;
   ASSERT_EQ(covariance.rows(), kept);
   EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-4 * plain.norm());
@@ -184,9 +199,11 @@ BundleOptions scaledByScatter() {
 /// How much larger the covariance is made than by the noise assumed.
 double scatter(const CameraModel& model, BundleOptions options, const Bundle& bundle) {
   const int last = static_cast<int>(bundle.cameras.size()) - 1;
-  const Eigen::MatrixXd scaled = bundleCovariance(model, options, bundle, last, kScaleSigma);
+  const Eigen::MatrixXd scaled = bundleCovariance(model, options, bundle, last,
+                                                  depthShares(model, options, bundle), kScaleSigma);
   options.scale_by_scatter = false;
-  const Eigen::MatrixXd said = bundleCovariance(model, options, bundle, last, kScaleSigma);
+  const Eigen::MatrixXd said = bundleCovariance(model, options, bundle, last,
+                                                depthShares(model, options, bundle), kScaleSigma);
   return scaled.block<3, 3>(3, 3).trace() / said.block<3, 3>(3, 3).trace();  // of rotations
 }
 
@@ -277,7 +294,8 @@ TEST(BundleCovariance, IsThatOfTheErrorsMade) {
       error << was.position_world - is.position_world,
           vectorFromRotation(was.q_world_camera * is.q_world_camera.conjugate());
       const auto normalised = [&](const BundleOptions& said) {
-        const Eigen::MatrixXd P = bundleCovariance(model, said, bundle, 7, 1e-6);
+        const Eigen::MatrixXd P =
+            bundleCovariance(model, said, bundle, 7, depthShares(model, said, bundle), 1e-6);
         return error.dot(P.topLeftCorner<6, 6>().inverse() * error);
       };
       nees += normalised(options) / kDraws;

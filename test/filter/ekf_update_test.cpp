@@ -102,10 +102,15 @@ TEST_F(EkfUpdate, PredictedMeasurementsEqualThePlainFormula) {
   }
 }
 
+double sigmaOf(const FeatureMeasurement& m) {
+  return m.sigma_px > 0.0 ? m.sigma_px : exampleOptions().sigma_px;
+}
+
 /// Makes the noise of each match in `R`, and in `S`, that with which a t distribution weighs it, by
 /// what it and all others disagree by: each is predicted from the others, by regression. Returns
 /// how many are far off.
-int weighTails(const Eigen::VectorXd& innovation, Eigen::MatrixXd S, Eigen::MatrixXd* R) {
+int weighTails(const std::vector<FeatureMeasurement>& measurements,
+               const Eigen::VectorXd& innovation, Eigen::MatrixXd S, Eigen::MatrixXd* R) {
   const int n = static_cast<int>(innovation.size()), rest = n - 2;
   const Eigen::MatrixXd expected_R = *R;
   std::vector<double> more_px2(n / 2, 0.0);
@@ -124,9 +129,9 @@ int weighTails(const Eigen::VectorXd& innovation, Eigen::MatrixXd S, Eigen::Matr
           C.bottomLeftCorner(2, rest) * C.topLeftCorner(rest, rest).inverse();
       const Eigen::Vector2d left = y.tail<2>() - gain * y.head(rest);
       Eigen::Matrix2d covariance = C.bottomRightCorner<2, 2>() - gain * C.topRightCorner(rest, 2);
-      covariance.diagonal().array() -= more_px2[i / 2];
+      covariance -= more_px2[i / 2] * measurements[i / 2].noise_shape;
       const double chi2 = left.dot(covariance.inverse() * left);
-      const double own_px2 = i == 2 ? 2.5 * 2.5 : std::pow(exampleOptions().sigma_px, 2);
+      const double own_px2 = std::pow(sigmaOf(measurements[i / 2]), 2);
       const double factor = kTailVariance * (kTailDegrees + chi2) / (kTailDegrees + 2.0);
       const double more = (factor - 1.0) * own_px2;
       change = std::max(change, std::abs(more - more_px2[i / 2]) / (own_px2 + more_px2[i / 2]));
@@ -135,7 +140,8 @@ int weighTails(const Eigen::VectorXd& innovation, Eigen::MatrixXd S, Eigen::Matr
     }
     const Eigen::MatrixXd R_before = *R;
     for (int i = 0; i < n; i += 2)
-      R->diagonal().segment<2>(i) = expected_R.diagonal().segment<2>(i).array() + more_px2[i / 2];
+      R->block<2, 2>(i, i) =
+          expected_R.block<2, 2>(i, i) + more_px2[i / 2] * measurements[i / 2].noise_shape;
     S += *R - R_before;
     if (change <= 0.02) break;
   }
@@ -171,6 +177,8 @@ TEST_F(EkfUpdate, EqualsTheRestByErrorsThatLastAndThenTheImpulseByThoseOfAnImage
     once.update_iterations = 1;
     filter.setOptions(once);
     measurements[1].sigma_px = 2.5;
+    for (std::size_t i = 0; i < measurements.size(); i += 2)
+      measurements[i].noise_shape << 1.0 + 0.1 * i, 0.3, 0.3, 1.0 - 0.1 * i;
     if (seed != 2u)
       for (std::size_t i = 0; i < measurements.size(); ++i)
         measurements[i].repetitions = 1.0 + 3.0 * i;
@@ -187,22 +195,23 @@ TEST_F(EkfUpdate, EqualsTheRestByErrorsThatLastAndThenTheImpulseByThoseOfAnImage
     const Eigen::MatrixXd H = denseJacobian(before, model_, ids);
     const Eigen::MatrixXd P = before.covariance();
     Eigen::MatrixXd R = measurementNoise(before, model_, ids);
-    R.block<2, 2>(2, 2) +=
-        (2.5 * 2.5 - once.sigma_px * once.sigma_px) * Eigen::Matrix2d::Identity();
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      R.block<2, 2>(2 * i, 2 * i) +=
+          std::pow(sigmaOf(measurements[i]), 2) * measurements[i].noise_shape -
+          once.sigma_px * once.sigma_px * Eigen::Matrix2d::Identity();
     const Eigen::MatrixXd S_before = H * P * H.transpose() + R;
     Eigen::VectorXd innovation(rows);
     for (std::size_t i = 0; i < ids.size(); ++i) {
       innovation.segment<2>(2 * i) =
           measurements[i].pixel - seenBy(before, model_, *before.find(ids[i]))->pixel;
     }
-    far_off += weighTails(innovation, S_before, &R);
+    far_off += weighTails(measurements, innovation, S_before, &R);
     // What was there before the impulse, by errors that last; the impulse, given that, by R alone.
     Eigen::MatrixXd lasting = Eigen::MatrixXd::Zero(rows, rows);
-    for (std::size_t i = 0; i < ids.size(); ++i) {
-      const double sigma_px = i == 1 ? 2.5 : once.sigma_px;
-      lasting.diagonal().segment<2>(2 * i).setConstant((measurements[i].repetitions - 1.0) *
-                                                       sigma_px * sigma_px);
-    }
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      lasting.block<2, 2>(2 * i, 2 * i) = (measurements[i].repetitions - 1.0) *
+                                          std::pow(sigmaOf(measurements[i]), 2) *
+                                          measurements[i].noise_shape;
     const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(n, n), B = H * G;
     const Eigen::MatrixXd P_rest = P - G * G.transpose();
     const Eigen::MatrixXd N = B * B.transpose() + R;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
@@ -152,6 +153,36 @@ TEST(Subpixel, TellsItsErrorFromWhatIsLeft) {
   const auto hidden = refineSubpixel(image, patch, {30.0, 30.0});
   ASSERT_TRUE(hidden);
   EXPECT_GT(hidden->sigma_px, 2.0 * seen->sigma_px);
+}
+
+TEST(Subpixel, TellsAlongWhichAxisItErrsMore) {
+  Eigen::Vector2d squares = Eigen::Vector2d::Zero();  // along the long axis and the short one
+  double longer = 0.0;
+  int count = 0;
+  for (unsigned seed = 0; count < 200; ++seed) {
+    const WaveTexture texture(500 + seed, 6.0, 35.0);
+    if (cornerness(texture) < 0.1) continue;
+    cv::Mat first = texture.render(31, 31), second = first.clone();
+    addNoise(&first, 3.0, 2 * seed);
+    addNoise(&second, 3.0, 2 * seed + 1);
+    const Template patch = *makeTemplate(first(cv::Rect(10, 10, 11, 11)));
+    const auto fit = refineSubpixel(second, patch, Eigen::Vector2d(15, 15));
+    if (!fit) continue;
+    EXPECT_NEAR(fit->noise_shape.trace(), 2.0, 1e-9);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(fit->noise_shape);
+    const Eigen::Vector2d sizes = fit->sigma_px * axes.eigenvalues().cwiseSqrt();
+    const Eigen::Vector2d error =
+        axes.eigenvectors().transpose() * (fit->pixel - Eigen::Vector2d(15, 15));
+    squares += error.cwiseQuotient(sizes).cwiseAbs2().reverse();
+    longer += sizes[1] / sizes[0];
+    ++count;
+  }
+  squares /= count;
+  std::printf("errors in those told: %.2f along, %.2f across, %.1f times as long as wide\n",
+              std::sqrt(squares[0]), std::sqrt(squares[1]), longer / count);
+  EXPECT_GT(longer / count, 1.5);
+  EXPECT_NEAR(squares[0], 1.0, 0.35);
+  EXPECT_NEAR(squares[1], 1.0, 0.35);
 }
 
 TEST(Subpixel, GivesUpRatherThanInvent) {

@@ -18,6 +18,8 @@ struct BundleObservation {
   Eigen::Matrix<double, 2, CameraError::kCalibrationSize> d_calibration =
       Eigen::Matrix<double, 2, CameraError::kCalibrationSize>::Zero();
   double noise = 1.0;  ///< standard deviation, in BundleOptions::sigma_px
+  /// Inverse of FeatureMeasurement::noise_shape.
+  Eigen::Matrix2d inverse_shape = Eigen::Matrix2d::Identity();
 };
 
 /// Cameras, features and calibration to be adjusted together. The first camera is the world: it
@@ -65,11 +67,16 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
 /// points is what makes the last camera as uncertain as it would move, on the whole, if one feature
 /// or another were left out: the jackknife over clusters, in which errors may last from image to
 /// image (Cameron and Miller 2015, A Practitioner's Guide to Cluster-Robust Inference). The unit of
-/// length is that in which the mean logarithm of the inverse depths, weighted by what each would
-/// tell if the cameras were known, is what it is, to `relative_scale_sigma`.
+/// length is that in which the mean logarithm of the inverse depths, weighted by `unit_shares` (of
+/// sum 1), is what it is, to `relative_scale_sigma`.
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera,
-                                 double relative_scale_sigma);
+                                 const Eigen::VectorXd& unit_shares, double relative_scale_sigma);
+
+/// What each feature tells of the logarithm of the unit of length, if the cameras were known:
+/// shares of 1.
+Eigen::VectorXd depthShares(const CameraModel& model, const BundleOptions& options,
+                            const Bundle& bundle);
 
 /// Root mean square [px], per axis, of what image points miss of each feature's projections, over
 /// their noise in that of most.

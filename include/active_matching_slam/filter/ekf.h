@@ -29,6 +29,8 @@ struct FeatureMeasurement {
   /// Images that share its error, at least 1: all that was before the image, which remembers, is
   /// told of it as of white noise of so many times the variance.
   double repetitions = 1.0;
+  /// Covariance of its error over sigma_px^2 (trace 2).
+  Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
 };
 
 struct UpdateReport {
@@ -39,7 +41,8 @@ struct UpdateReport {
   /// Of each measurement given, the share of its variance that it should still show, less the
   /// feature's projection, after the update (per axis): the state follows the rest. 0: not used.
   std::vector<double> noise_left;
-  /// What the state leaves of each measurement, first order [px]; zero: not used.
+  /// What the state leaves of each measurement, first order, along axes in which its noise is of
+  /// equal size and independent [px]; zero: not used.
   std::vector<Eigen::Vector2d> left_px;
 };
 

@@ -109,6 +109,7 @@ class StartAdjustment {
                    const std::vector<FeatureId>& ids) const;
   std::optional<Weighed> weigh(const CameraModel& model, const Ekf& filter,
                                const Reading& chosen) const;
+  Eigen::VectorXd unitShares(const std::vector<FeatureId>& ids) const;
   std::optional<AdjustedStart> adopt(const CameraModel& model, const Ekf& filter, Weighed weighed);
   void takeOver(const Reading& reading, AdjustedStart* start);
 
@@ -118,8 +119,10 @@ class StartAdjustment {
   std::vector<FeatureState> features_;
   std::optional<Reading> chosen_;    ///< at the image before, for the next step
   std::vector<FeatureId> adjusted_;  ///< features that took part when adjusted last, ascending
-  bool has_left_first_ = false;      ///< the last image shares too little with the first
-  bool is_settled_ = false;          ///< what the filter was given has no opposite any more
+  /// What features count in the unit of length, as first adjusted; ascending id.
+  std::vector<std::pair<FeatureId, double>> unit_shares_;
+  bool has_left_first_ = false;  ///< the last image shares too little with the first
+  bool is_settled_ = false;      ///< what the filter was given has no opposite any more
   double least_motion_px_ = 1.0;
   double last_parallax_px_ = 0.0;  ///< when adjusted last; zero: has not been
   double next_parallax_px_ = 0.0;  ///< to be adjusted at

@@ -18,6 +18,9 @@ struct TemplateFit {
   /// Standard deviation per axis [px] that least squares makes of what is left between the two:
   /// more than noise where the template is no longer what is seen.
   double sigma_px = 0.0;
+  /// The same in two dimensions, in that of both axes on average: a covariance of trace 2. Along an
+  /// edge it is larger than across.
+  Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
 };
 
 /// Aligns the template with the image by translation, gain and offset (inverse compositional

@@ -20,6 +20,8 @@ struct SearchMatch {
   double score = 0.0;     ///< similarity, for images ZNCC in [-1, 1]
   int id = -1;            ///< stable within the feature; searches list matches by ascending id
   double sigma_px = 0.0;  ///< per axis, as far as the image tells; 0: unknown
+  /// Covariance of its error in that of both axes on average (trace 2).
+  Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
 };
 
 /// What one search brought.
