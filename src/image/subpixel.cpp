@@ -16,6 +16,9 @@ constexpr int kStride = SampledWindow::kStride;
 int roundedUp(int count) { return (count + 7) / 8 * 8; }
 
 constexpr int kSums = 13;
+/// Of the noise of a fit, the share that is taken to be alike along both axes, whatever least
+/// squares have: templates are never quite what is seen.
+constexpr double kAlikeShare = 0.25;
 
 /// The sums that make the normal equations, over the template: of grey level I, slopes I_u and I_v,
 /// 1 and t, products as named in NormalEquations. They run along columns first: a fixed order, and
@@ -79,7 +82,8 @@ class NormalEquations {
     const double left_over = std::max(0.0, pixels_ * variance - x.dot(right_)) / (pixels_ - 4);
     const Eigen::Matrix2d shape = left_.inverse().block<2, 2>(1, 1);
     const double mean = 0.5 * shape.trace();
-    return {pixel, std::sqrt(left_over * mean) / x[0], shape / mean};
+    return {pixel, std::sqrt(left_over * mean) / x[0],
+            (1.0 - kAlikeShare) / mean * shape + kAlikeShare * Eigen::Matrix2d::Identity()};
   }
 
  private:

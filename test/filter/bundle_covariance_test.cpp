@@ -105,14 +105,15 @@ Eigen::MatrixXd jacobian(const CameraModel& model, const Bundle& bundle) {
   return J;
 }
 
-/// Information that the priors give of the calibration and of the inverse depths.
+/// Information that the priors give of the calibration, of the bearings (a little: of one that no
+/// image shows) and of the inverse depths.
 Eigen::VectorXd priorInformation(const BundleOptions& options, const Bundle& bundle) {
   const Layout layout(bundle);
   Eigen::VectorXd information = Eigen::VectorXd::Zero(layout.size);
   information.segment<kCalibrationSize>(layout.calibration) =
       options.sigma_calibration.array().square().inverse();
-  for (int row = layout.first_feature + 2; row < layout.size; row += 3)
-    information[row] = 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
+  for (int row = layout.first_feature; row < layout.size; row += 3)
+    information.segment<3>(row) << 1e-2, 1e-2, std::pow(options.sigma_inverse_depth, -2);
   return information;
 }
 

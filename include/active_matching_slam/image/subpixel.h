@@ -19,7 +19,7 @@ struct TemplateFit {
   /// more than noise where the template is no longer what is seen.
   double sigma_px = 0.0;
   /// The same in two dimensions, in that of both axes on average: a covariance of trace 2. Along an
-  /// edge it is larger than across.
+  /// edge it is larger than across; a quarter is taken to be alike.
   Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
 };
 
