@@ -55,7 +55,9 @@ UpdateReport Ekf::update(const CameraModel& camera,
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     const FeatureMeasurement& m = measurements[i];
     const int index = indexOf(m.id);
-    if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px)) continue;
+    if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px) ||
+        !m.noise_shape.allFinite())
+      continue;
     if (!projectFeature(lens, camera_, features_[index])) continue;
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
     const double variance_px2 = sigma_px * sigma_px;

@@ -390,12 +390,7 @@ std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, co
   // The unit of length stays. Of depths that were guessed only the middle means something.
   Eigen::VectorXd unit_shares = unitShares(reading.ids);
   const bool has_unit = unit_shares.size() > 0;
-  if (!has_unit) {
-    unit_shares = depthShares(model, weighed.options, reading.bundle);
-    unit_shares_.clear();
-    for (std::size_t i = 0; i < reading.ids.size(); ++i)
-      unit_shares_.emplace_back(reading.ids[i], unit_shares[static_cast<Eigen::Index>(i)]);
-  }
+  if (!has_unit) unit_shares = depthShares(model, weighed.options, reading.bundle);
   rescaleBundle(has_unit || is_refinement
                     ? depthFactor(unit_shares, weighed.believed, reading.bundle)
                     : medianDepthFactor(weighed.believed, reading.bundle),
@@ -403,6 +398,11 @@ std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, co
   auto start = makeAdjustedStart(model, filter, weighed.options, reading.bundle, reading.ids,
                                  unit_shares, images_.back().interval_s);
   if (!start) return std::nullopt;
+  if (!has_unit) {
+    unit_shares_.clear();
+    for (std::size_t i = 0; i < reading.ids.size(); ++i)
+      unit_shares_.emplace_back(reading.ids[i], unit_shares[static_cast<Eigen::Index>(i)]);
+  }
   if (reading.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();
     return std::nullopt;

@@ -327,9 +327,11 @@ TEST_F(EkfUpdate, SkipsWhatCanNotBeFusedAndLeavesTheRestUntouched) {
   mixed.push_back({good[2].id, Eigen::Vector2d(100.0, 100.0), nan});
   mixed.push_back({behind, Eigen::Vector2d(100.0, 100.0), 0.0});
   mixed.push_back({12345, Eigen::Vector2d(100.0, 100.0), 0.0});
+  mixed.push_back(good[0]);
+  mixed.back().noise_shape(0, 1) = nan;
   const UpdateReport report = filter.update(model_, mixed);
   EXPECT_EQ(report.used, 3);
-  EXPECT_EQ(report.skipped, 5);
+  EXPECT_EQ(report.skipped, 6);
   EXPECT_TRUE(report.healthy);
   expected.update(model_, good);
   EXPECT_EQ(filter.covariance(), expected.covariance());
