@@ -25,10 +25,9 @@ using ImpulseRoot = Eigen::Matrix<double, CameraError::kMotionSize, 6>;
 /// rest is known so, with the noise of one image. Matches are
 /// more often far off than a Gaussian's: each has the variance that an error of the t distribution
 /// which is as large as what it and all others disagree by is weighed with (Lange, Little & Taylor
-/// 1989). All errors count from the prior mean; the Jacobian of an
-/// iteration is that of the mean reached. The second-order noise stays the prior's: shrunk along
-/// with the posterior it trusted the wrong one of two explanations of a small first move, depths
-/// reversed, for good.
+/// 1989). All errors count from the prior mean; the Jacobian of an iteration is that of the mean
+/// reached. The second-order noise stays the prior's: shrunk along with the posterior it trusted
+/// the wrong one of two explanations of a small first move, depths reversed, for good.
 class MeasurementUpdate {
  public:
   /// `X`: workspace, state size x 2 measurements. `calibration_share`: how much of its correction

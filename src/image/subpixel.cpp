@@ -15,10 +15,11 @@ constexpr int kStride = SampledWindow::kStride;
 
 int roundedUp(int count) { return (count + 7) / 8 * 8; }
 
-constexpr int kSums = 13;
 /// Of the noise of a fit, the share that is taken to be alike along both axes, whatever least
 /// squares have: templates are never quite what is seen.
 constexpr double kAlikeShare = 0.25;
+
+constexpr int kSums = 13;
 
 /// The sums that make the normal equations, over the template: of grey level I, slopes I_u and I_v,
 /// 1 and t, products as named in NormalEquations. They run along columns first: a fixed order, and

@@ -277,20 +277,18 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
     if (frame->matching.match_of_feature[i] >= 0) matched.push_back(i);
   }
   const int m = static_cast<int>(matched.size());
+  const auto matchOf = [&](int i) -> const SearchMatch& {
+    return search_.matches(i)[frame->matching.match_of_feature[i]];
+  };
   Eigen::VectorXd innovation(2 * m);
-  std::vector<const SearchMatch*> accepted(m);
-  for (int a = 0; a < m; ++a) {
-    const SearchMatch& match =
-        search_.matches(matched[a])[frame->matching.match_of_feature[matched[a]]];
-    innovation.segment<2>(2 * a) = match.pixel - prior_.mean(matched[a]);
-    accepted[a] = &match;
-  }
+  for (int a = 0; a < m; ++a)
+    innovation.segment<2>(2 * a) = matchOf(matched[a]).pixel - prior_.mean(matched[a]);
   const Eigen::MatrixXd S = selectFeatures(prior_.S, matched);
   std::vector<FeatureMeasurement> fused;
   std::vector<double> seen_px;
   for (int k : agreeingMeasurements(innovation, S, kAgreementChi2)) {
     const FeatureId id = prior_.ids[matched[k]];
-    const SearchMatch& match = *accepted[k];
+    const SearchMatch& match = matchOf(matched[k]);
     fused.push_back({id, match.pixel, match.sigma_px, 1.0, match.noise_shape});
     if (match.sigma_px > 0.0) seen_px.push_back(match.sigma_px);
   }
