@@ -50,13 +50,13 @@ std::optional<AdjustedStart> makeAdjustedStart(const CameraModel& model, const E
                                                const BundleOptions& options, const Bundle& bundle,
                                                const std::vector<FeatureId>& ids,
                                                const Eigen::VectorXd& unit_shares,
-                                               double interval_s) {
+                                               double unit_sigma, double interval_s) {
   const int last = static_cast<int>(bundle.cameras.size()) - 1;
   const double dt = interval_s;
   BundleOptions doubting_lens = options;
   doubting_lens.sigma_calibration = calibrationSigmas(filter.options());
   const Eigen::MatrixXd joint =
-      bundleCovariance(model, doubting_lens, bundle, last - 1, unit_shares, Ekf::kFreeScaleSigma);
+      bundleCovariance(model, doubting_lens, bundle, last - 1, unit_shares, unit_sigma);
   if (joint.size() == 0 || !joint.allFinite() || !(dt > 0.0)) return std::nullopt;
 
   AdjustedStart start;

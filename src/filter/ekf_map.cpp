@@ -10,8 +10,9 @@
 namespace active_matching_slam {
 namespace {
 
-/// Of p = a + m / rho by the feature's error, 3 x size().
+/// Of a point, or of p = a + m / rho, by the feature's error, 3 x size().
 Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> positionJacobian(const FeatureState& feature) {
+  if (feature.kind == FeatureKind::kPoint) return Eigen::Matrix3d::Identity();
   const double depth = 1.0 / feature.inverse_depth;
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> J(3, feature.size());
   J.rightCols<3>() << depth * feature.tangentBasis(), -depth * depth * feature.bearing_world;
@@ -178,12 +179,25 @@ std::vector<FeatureId> Ekf::convertToPoints() {
 }
 
 Eigen::Matrix3d Ekf::positionCovariance(const FeatureState& feature) const {
-  const auto P = covariance_.view();
-  if (feature.kind == FeatureKind::kPoint) return P.block<3, 3>(feature.offset, feature.offset);
   const auto J = positionJacobian(feature);
   const int o = feature.offset, size = feature.size();
-  const Eigen::Matrix3d covariance = J * P.block(o, o, size, size) * J.transpose();
+  const Eigen::Matrix3d covariance = J * covariance_.view().block(o, o, size, size) * J.transpose();
   return 0.5 * (covariance + covariance.transpose());
+}
+
+double Ekf::sigmaMeanLogDistance(const std::vector<FeatureId>& ids,
+                                 const Eigen::VectorXd& shares) const {
+  // A rotation of the world about its origin, which is in each feature's error, changes nothing.
+  Eigen::VectorXd functional = Eigen::VectorXd::Zero(stateSize());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const double share = shares[static_cast<Eigen::Index>(i)];
+    if (share == 0.0) continue;
+    const FeatureState& feature = *find(ids[i]);
+    const Eigen::Vector3d position = feature.position();
+    functional.segment(feature.offset, feature.size()) +=
+        share / position.squaredNorm() * (positionJacobian(feature).transpose() * position);
+  }
+  return std::sqrt(std::max(functional.dot(covariance_.view() * functional), 0.0));
 }
 
 double Ekf::sigmaInverseDepth(const FeatureState& feature) const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "active_matching_slam/filter/quantile.h"
+#include "start_directions.h"
 
 namespace active_matching_slam {
 namespace {
@@ -25,8 +26,8 @@ constexpr double kMostCostPerPoint = 4.0;  ///< of 2 expected: beyond, things mo
 constexpr double kLeastNoise_px = 0.04;    ///< by which matches are told from wrong ones
 /// Of the assumed variance: when readings are compared, images are credited with no less.
 constexpr double kLeastNoiseShare = 0.05;
-constexpr double kMostNoise = 3.0;      ///< of a feature, in the median, that counts
-constexpr double kSameDirection = 0.8;  ///< cosine between two readings' moves that are one
+constexpr double kMostNoise = 3.0;       ///< of a feature, in the median, that counts
+constexpr double kSameDirection = 0.95;  ///< cosine between two readings' moves that are one
 
 bool isSameReading(const Bundle& a, const Bundle& b) {
   const Eigen::Vector3d& x = a.cameras.back().position_world;
@@ -138,9 +139,16 @@ std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleO
   const double least_gap = kLeastCostGap * std::max(1.0, credited);
   telling.hopeless_cost = std::numeric_limits<double>::infinity();
   telling.least_gain = kGainToTell;
-  for (std::size_t i = 0; i < costs.size(); ++i) {
-    costs[i] = adjustBundle(model, telling, &readings[i]);
-    telling.hopeless_cost = std::min(telling.hopeless_cost, costs[i] + least_gap);
+  if (is_first) {
+    Bundle turned = someImages(believed);
+    flatten(model, options.inverse_depth, &turned);
+    for (Bundle& reading : readingsByDirection(model, telling, turned))
+      readings.push_back(std::move(reading));
+  }
+  costs.clear();
+  for (Bundle& reading : readings) {
+    costs.push_back(adjustBundle(model, telling, &reading));
+    telling.hopeless_cost = std::min(telling.hopeless_cost, costs.back() + least_gap);
   }
   best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   double lead = std::numeric_limits<double>::infinity();

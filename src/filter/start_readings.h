@@ -13,8 +13,8 @@ struct ChosenReading {
 };
 
 /// The reading of the images that is clearly the best, by some of them: `believed`, the first
-/// time also a camera that only turned, or one of these with near and far exchanged. Empty when in
-/// doubt.
+/// time also a camera that only turned, one of these with near and far exchanged, and the first
+/// time readingsByDirection(). Empty when in doubt.
 std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleOptions& options,
                                          const Bundle& believed, bool is_first);
 

@@ -10,22 +10,20 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kRow = 8;  ///< numbers taken at once: the taps and what fills a vector
-
 /// Interpolates at positions from (-0.5, -0.5) on; beyond the rim the outermost pixels repeat.
 float sample(const cv::Mat& image, double u, double v) {
   // Truncation is the floor of what is positive, and far cheaper.
   const int at_u = static_cast<int>(u + 1.0) - 1, at_v = static_cast<int>(v + 1.0) - 1;
   const int first_u = at_u - kTapsBefore, first_v = at_v - kTapsBefore;
-  float weights_u[kRow] = {}, weights_v[kTaps];
+  float weights_u[kTaps], weights_v[kTaps];
   interpolationWeights(u - at_u, weights_u);
   interpolationWeights(v - at_v, weights_v);
-  float columns[kRow] = {};
-  if (first_u >= 0 && first_v >= 0 && first_u + kRow <= image.cols &&
+  float columns[kTaps] = {};
+  if (first_u >= 0 && first_v >= 0 && first_u + kTaps <= image.cols &&
       first_v + kTaps <= image.rows) {
     for (int j = 0; j < kTaps; ++j) {
       const std::uint8_t* row = image.ptr<std::uint8_t>(first_v + j) + first_u;
-      for (int i = 0; i < kRow; ++i) columns[i] += weights_v[j] * static_cast<float>(row[i]);
+      for (int i = 0; i < kTaps; ++i) columns[i] += weights_v[j] * static_cast<float>(row[i]);
     }
   } else {
     for (int j = 0; j < kTaps; ++j) {

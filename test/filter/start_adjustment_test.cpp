@@ -327,7 +327,7 @@ TEST(StartAdjustment, GoesOnWhenTheFirstImageIsOutOfSight) {
 }
 
 TEST(StartAdjustment, TheUnitOfTheDepthsStays) {
-  const Bundle truth = track(24, 0.0005, 7);
+  const Bundle truth = track(24, 0.002, 7);
   StartOfATrack start(truth);
   const auto first = start.adjustAfter(11);
   ASSERT_TRUE(first);

@@ -133,7 +133,7 @@ TEST(Subpixel, WhatMovesAlikeIsNotMovedToOneSide) {
     }
     ASSERT_GT(count, 50);
     std::printf("shift %.2f px: off by %.4f px on average\n", shift, sum / count);
-    EXPECT_LT(std::abs(sum / count), 0.006) << shift;
+    EXPECT_LT(std::abs(sum / count), 0.002) << shift;
   }
 }
 
@@ -182,7 +182,8 @@ TEST(Subpixel, TellsAlongWhichAxisItErrsMore) {
               std::sqrt(squares[0]), std::sqrt(squares[1]), longer / count);
   EXPECT_GT(longer / count, 1.4);
   EXPECT_NEAR(squares[0], 1.0, 0.35);
-  EXPECT_NEAR(squares[1], 1.0, 0.35);
+  EXPECT_LT(squares[1], 1.35);  // less, where a quarter of the noise is not alike along both axes
+  EXPECT_GT(squares[1], 0.5);
 }
 
 TEST(Subpixel, GivesUpRatherThanInvent) {

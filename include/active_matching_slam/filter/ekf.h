@@ -117,7 +117,7 @@ class Ekf {
   /// only chooses the gauge, and keeps what follows from changing the unit.
   void fixScale(double relative_sigma);
   /// How well a start is taken to know the unit that it chooses.
-  static constexpr double kFreeScaleSigma = 3e-4;
+  static constexpr double kFreeScaleSigma = 2e-4;
 
   /// Multiplies all lengths (map, position, velocity and their covariances) by `factor` > 0.
   void rescale(double factor);
@@ -134,6 +134,10 @@ class Ekf {
   }
   /// 3 x 3 covariance of a feature's position in the world (first order for inverse depth).
   Eigen::Matrix3d positionCovariance(const FeatureState& feature) const;
+  /// Standard deviation of the mean logarithm of the distances from the world's origin, in which
+  /// the features `ids` count `shares`; those that are unknown must count nothing.
+  double sigmaMeanLogDistance(const std::vector<FeatureId>& ids,
+                              const Eigen::VectorXd& shares) const;
   /// Standard deviation of rho, for kInverseDepth.
   double sigmaInverseDepth(const FeatureState& feature) const;
 

@@ -97,6 +97,13 @@ class StartAdjustment {
     BundleOptions options;
   };
 
+  /// Of length: the mean log distance from the first camera.
+  struct Unit {
+    Eigen::VectorXd shares;  ///< of the features; sum 1
+    double sigma = 0.0;      ///< of that mean, where the unit before is one
+    bool is_kept = false;    ///< the one before
+  };
+
   void thinOut();
   void rememberFeatures(const Ekf& filter);
   std::optional<double> parallax(const CameraModel& model);
@@ -109,7 +116,7 @@ class StartAdjustment {
                    const std::vector<FeatureId>& ids) const;
   std::optional<Weighed> weigh(const CameraModel& model, const Ekf& filter,
                                const Reading& chosen) const;
-  Eigen::VectorXd unitShares(const std::vector<FeatureId>& ids) const;
+  Unit unitOf(const CameraModel& model, const Ekf& filter, const Weighed& weighed) const;
   std::optional<AdjustedStart> adopt(const CameraModel& model, const Ekf& filter, Weighed weighed);
   void takeOver(const Reading& reading, AdjustedStart* start);
 
@@ -121,6 +128,7 @@ class StartAdjustment {
   std::vector<FeatureId> adjusted_;  ///< features that took part when adjusted last, ascending
   /// What features count in the unit of length, as first adjusted; ascending id.
   std::vector<std::pair<FeatureId, double>> unit_shares_;
+  double length_sigma_ = 0.0;    ///< relative, of the way from the first camera; the least so far
   bool has_left_first_ = false;  ///< the last image shares too little with the first
   bool is_settled_ = false;      ///< what the filter was given has no opposite any more
   double least_motion_px_ = 1.0;
