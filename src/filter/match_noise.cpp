@@ -16,7 +16,7 @@ constexpr std::size_t kLeastMatches = 8;
 constexpr double kLeastWeightShown = 0.6, kLeastWeightSeen = 0.05;
 /// The noise that matches are taken to have, but for their tails, in what updates show. (By NEES
 /// over rendered runs, as are the next.)
-constexpr double kShareOfShown = 0.77;
+constexpr double kShareOfShown = 0.75;
 /// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
 constexpr double kLastingShare = 0.5;
 /// Motion of the image after which what lasts is another, and the most images that are taken to

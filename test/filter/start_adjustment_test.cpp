@@ -353,6 +353,35 @@ TEST(StartAdjustment, TheUnitOfTheDepthsStays) {
   EXPECT_GT(cosineBetween(second->camera.position_world, truth.cameras[23].position_world), 0.99);
 }
 
+TEST(StartAdjustment, AUnitOfWhatIsGoneIsUncertain) {
+  const Bundle truth = track(24, 0.002, 7);
+  const auto relativeSigma = [&truth](bool loses_near) {
+    StartOfATrack start(truth);
+    const auto first = start.adjustAfter(11);
+    EXPECT_TRUE(first);
+    if (!first) return 0.0;
+    start.filter().restore(first->camera, first->features, first->covariance, 1000);
+    std::vector<FeatureId> near;  // they tell most of the unit
+    for (const FeatureState& feature : first->features)
+      if (feature.inverse_depth > 1.3 * medianInverseDepth(*first)) near.push_back(feature.id);
+    EXPECT_GE(near.size(), 5u);
+    if (loses_near) start.filter().removeFeatures(near);
+    for (int k = 12; k <= 23; ++k) {
+      start.filter().predict(1.0 / 30.0);
+      start.show(k);
+    }
+    const auto second = start.adjust();
+    EXPECT_TRUE(second);
+    if (!second) return 0.0;
+    const Eigen::Vector3d way = second->camera.position_world;
+    return std::sqrt(way.dot(second->covariance.topLeftCorner<3, 3>() * way)) / way.squaredNorm();
+  };
+  // The images are the same, also of what the filter has lost.
+  const double all = relativeSigma(false), fewer = relativeSigma(true);
+  std::printf("length of the way known to %.5f, %.5f where near ones are gone\n", all, fewer);
+  EXPECT_GT(fewer, 1.1 * all);
+}
+
 TEST(StartAdjustment, GoesInStepsAndTakesInTheImageOfTheLast) {
   for (const auto& [images, steps] : {std::pair{12, 2}, std::pair{26, 3}}) {
     const Bundle truth = track(images, 0.003, 9);
