@@ -111,9 +111,11 @@ double noiseOf(const CameraModel& model, const Bundle& bundle) {
 std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleOptions& options,
                                          const Bundle& believed, bool is_first) {
   std::vector<Bundle> readings(1, someImages(believed));
+  Bundle turned;
   if (is_first) {
-    readings.push_back(readings[0]);
-    flatten(model, options.inverse_depth, &readings[1]);
+    turned = readings[0];
+    flatten(model, options.inverse_depth, &turned);
+    readings.push_back(turned);
   }
   const std::size_t upright = readings.size();
   std::vector<double> costs;
@@ -140,8 +142,6 @@ std::optional<ChosenReading> bestReading(const CameraModel& model, const BundleO
   telling.hopeless_cost = std::numeric_limits<double>::infinity();
   telling.least_gain = kGainToTell;
   if (is_first) {
-    Bundle turned = someImages(believed);
-    flatten(model, options.inverse_depth, &turned);
     for (Bundle& reading : readingsByDirection(model, telling, turned))
       readings.push_back(std::move(reading));
   }

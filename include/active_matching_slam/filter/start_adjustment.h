@@ -126,7 +126,7 @@ class StartAdjustment {
   std::vector<FeatureState> features_;
   std::optional<Reading> chosen_;    ///< at the image before, for the next step
   std::vector<FeatureId> adjusted_;  ///< features that took part when adjusted last, ascending
-  /// What features count in the unit of length, as first adjusted; ascending id.
+  /// What features count in the unit of length, as it was chosen last; ascending id.
   std::vector<std::pair<FeatureId, double>> unit_shares_;
   double length_sigma_ = 0.0;    ///< relative, of the way from the first camera; the least so far
   bool has_left_first_ = false;  ///< the last image shares too little with the first
