@@ -19,6 +19,10 @@ constexpr double kLeastWeightShown = 0.6, kLeastWeightSeen = 0.05;
 constexpr double kShareOfShown = 0.75;
 /// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
 constexpr double kLastingShare = 0.5;
+/// Power of what features show of their lasting errors' variance by which these are larger, and the
+/// least and most that it makes. (By what residuals tell of the errors of the same feature later.)
+constexpr double kLastingByShown = 0.75, kLeastLasting = 0.25, kMostLasting = 10.0;
+constexpr double kLastingWeight = 0.05;  ///< of one image in what most show
 /// Motion of the image after which what lasts is another, and the most images that are taken to
 /// have it in common.
 constexpr double kFreshPx = 5.0, kMostSameImages = 15.0;
@@ -32,6 +36,8 @@ constexpr double kSightWeight = 0.1;  ///< of one match in a feature's average, 
 constexpr double kMemory = 0.99;      ///< of a feature's noise, a match
 constexpr double kLikeOthers = 20.0;  ///< matches for which a feature is taken to be like others
 constexpr double kMostSigmas = 10.0;  ///< that one match says
+constexpr double kRecentWeight = 0.125;     ///< of one match in the average of some in a row
+constexpr double kEnoughForLasting = 30.0;  ///< matches
 
 }  // namespace
 
@@ -64,7 +70,22 @@ void MatchNoise::see(std::vector<double> sigmas_px) {
   if (seen_px_ > 0.0) of_image_ = std::clamp(now_px / seen_px_, kSharpest, kMostBlurred);
 }
 
-double MatchNoise::repetitions() const { return 1.0 + kLastingShare * (same_images_ - 1.0); }
+void MatchNoise::learnLasting(std::vector<double> lasting) {
+  if (lasting.size() < kLeastMatches) return;
+  const double now = medianOf(std::move(lasting));
+  lasting_ += (lasting_ > 0.0 ? kLastingWeight : 1.0) * (now - lasting_);
+}
+
+double MatchNoise::lastingLikeMost(const FeatureNoise& feature) const {
+  if (!(lasting_ > 0.0)) return 1.0;
+  return std::clamp(std::pow(feature.lastingLikeMost(lasting_), kLastingByShown), kLeastLasting,
+                    kMostLasting);
+}
+
+double MatchNoise::repetitions(const FeatureNoise& feature) const {
+  const double lasting = kLastingShare * lastingLikeMost(feature);
+  return 1.0 + lasting / (1.0 - kLastingShare + lasting) * (same_images_ - 1.0);
+}
 
 double MatchNoise::likeMost(const FeatureNoise& feature) const {
   if (!(feature.seen_px() > 0.0) || !(seen_px_ > 0.0)) return 1.0;
@@ -76,7 +97,8 @@ double MatchNoise::inThatOfMost(const FeatureNoise& feature) const {
 }
 
 double MatchNoise::wanderLikeMost(const FeatureNoise& feature) const {
-  return std::clamp(inThatOfMost(feature), kLeastWander, kMostWander);
+  return std::clamp(inThatOfMost(feature) * std::sqrt(lastingLikeMost(feature)), kLeastWander,
+                    kMostWander);
 }
 
 double MatchNoise::sigma_px(const FilterOptions& options) const {
@@ -86,8 +108,9 @@ double MatchNoise::sigma_px(const FilterOptions& options) const {
 }
 
 double MatchNoise::sigma_px(const FilterOptions& options, const FeatureNoise& feature) const {
+  const double in_that_of_most = 1.0 + kLastingShare * (lastingLikeMost(feature) - 1.0);
   return std::max(std::min(options.sigma_px, options.minimum_sigma_px),
-                  inThatOfMost(feature) * sigma_px(options));
+                  std::sqrt(in_that_of_most) * inThatOfMost(feature) * sigma_px(options));
 }
 
 void FeatureNoise::see(double sigma_px) {
@@ -103,6 +126,24 @@ void FeatureNoise::learn(const Eigen::Vector2d& residual_px, double shown_px) {
   if (!std::isfinite(squared)) return;
   sum_ = kMemory * sum_ + std::min(squared, kMostSigmas * kMostSigmas);
   count_ = kMemory * count_ + 1.0;
+  learnLasting(residual_px / shown_px);
+}
+
+void FeatureNoise::learnLasting(Eigen::Vector2d in_shown) {
+  if (in_shown.norm() > kMostSigmas) in_shown *= kMostSigmas / in_shown.norm();
+  recent_ += kRecentWeight * (in_shown - recent_);
+  recent_variance_ =
+      std::pow(1.0 - kRecentWeight, 2) * recent_variance_ + kRecentWeight * kRecentWeight;
+  lasting_sum_ = kMemory * lasting_sum_ + 0.5 * recent_.squaredNorm() / recent_variance_;
+}
+
+std::optional<double> FeatureNoise::lasting() const {
+  if (!(count_ > kEnoughForLasting)) return std::nullopt;
+  return lasting_sum_ / count_;
+}
+
+double FeatureNoise::lastingLikeMost(double of_most) const {
+  return (kLikeOthers + lasting_sum_ / of_most) / (kLikeOthers + count_);
 }
 
 double FeatureNoise::factor() const {

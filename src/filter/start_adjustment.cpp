@@ -33,7 +33,9 @@ constexpr double kRoughGain = 1e-2, kGainOnTheWay = 3e-3;
 constexpr int kStepsForOneMore = 2;  ///< once all but the last image are adjusted
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
-constexpr double kLeastOfUnit = 0.5;        ///< that is still seen of what told the unit of length
+constexpr double kLeastOfUnit = 0.5;  ///< that is still seen of what told the unit of length
+/// Of what lengths are uncertain by, what their unit is: logarithms are not linear.
+constexpr double kShareOfUnit = 0.01;
 constexpr double kShareOfLengths = 0.03;    ///< of what lengths are uncertain by, that makes none
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
@@ -238,7 +240,8 @@ std::vector<double> StartAdjustment::noiseOfFeatures(const std::vector<FeatureId
     for (const FeatureMeasurement& m : image.measurements) {
       const auto it = std::lower_bound(ids.begin(), ids.end(), m.id);
       if (it != ids.end() && *it == m.id && m.sigma_px > 0.0)
-        noise[it - ids.begin()] = std::max(kCleanestNoise, m.sigma_px / image.sigma_px);
+        noise[it - ids.begin()] =
+            std::max(kCleanestNoise, m.sigma_px / image.sigma_px * std::sqrt(m.lasting));
     }
   return noise;
 }
@@ -384,9 +387,10 @@ std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel
 StartAdjustment::Unit StartAdjustment::unitOf(const CameraModel& model, const Ekf& filter,
                                               const Weighed& weighed) const {
   const std::vector<FeatureId>& ids = weighed.reading.ids;
-  Unit anew{depthShares(model, weighed.options, weighed.reading.bundle), Ekf::kFreeScaleSigma};
+  const double sigma = std::min(Ekf::kFreeScaleSigma, kShareOfUnit * length_sigma_);
+  Unit anew{depthShares(model, weighed.options, weighed.reading.bundle), sigma};
   if (unit_shares_.empty()) return anew;
-  Unit kept{Eigen::VectorXd::Zero(anew.shares.size()), Ekf::kFreeScaleSigma, true};
+  Unit kept{Eigen::VectorXd::Zero(anew.shares.size()), sigma, true};
   auto known = unit_shares_.begin();
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);

@@ -266,6 +266,10 @@ void Tracker::Implementation::learnNoise(const UpdateReport& report) {
   if (!(shown_px > 0.0)) return;
   for (std::size_t i = 0; i < fused_.size(); ++i)
     map_.learnNoise(fused_[i].id, residuals_px[i], shown_px);
+  std::vector<double> lasting;
+  for (const FeatureMeasurement& match : fused_)
+    if (const auto known = map_.find(match.id)->noise.lasting()) lasting.push_back(*known);
+  match_noise_.learnLasting(std::move(lasting));
 }
 
 /// Fuses the accepted matches, and learns from them.
@@ -299,10 +303,11 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
     map_.seeNoise(match.id, match.sigma_px / match_noise_.ofImage());
     const MapFeature& feature = *map_.find(match.id);
     match.sigma_px = match_noise_.sigma_px(options_.filter, feature.noise);
+    match.lasting = match_noise_.lastingLikeMost(feature.noise);
     if (start_adjustment_.adjusts(match.id)) {
       match.repetitions = kLearntByAdjustment;
     } else if (!feature.known) {  // it lies where it was said to, whatever its first images showed
-      match.repetitions = match_noise_.repetitions();
+      match.repetitions = match_noise_.repetitions(feature.noise);
     }
   }
   fused_ = std::move(fused);

@@ -136,20 +136,21 @@ TEST(MatchNoise, TellsWhatAFrameShows) {
 
 TEST(MatchNoise, ErrorsLastTheLongerTheLessTheImageMoves) {
   MatchNoise noise;
-  EXPECT_EQ(noise.repetitions(), 1.0);
+  const FeatureNoise feature;
+  EXPECT_EQ(noise.repetitions(feature), 1.0);
   noise.seeMotion(std::vector<double>(20, 200.0));
-  EXPECT_EQ(noise.repetitions(), 1.0);
+  EXPECT_EQ(noise.repetitions(feature), 1.0);
   noise.seeMotion(std::vector<double>(20, 2.0));
-  const double moving = noise.repetitions();
+  const double moving = noise.repetitions(feature);
   EXPECT_GT(moving, 1.5);
   noise.seeMotion(std::vector<double>(20, 0.5));
-  const double slow = noise.repetitions();
+  const double slow = noise.repetitions(feature);
   EXPECT_GT(slow, 2.0 * moving);
   noise.seeMotion(std::vector<double>(20, 0.0));  // not for ever
-  EXPECT_GT(noise.repetitions(), slow);
-  EXPECT_LT(noise.repetitions(), 2.0 * slow);
+  EXPECT_GT(noise.repetitions(feature), slow);
+  EXPECT_LT(noise.repetitions(feature), 2.0 * slow);
   noise.seeMotion({0.0, 0.0});  // too few
-  EXPECT_EQ(noise.repetitions(), 1.0);
+  EXPECT_EQ(noise.repetitions(feature), 1.0);
 }
 
 FeatureNoise learntFeature(double sigma, int matches, double shown_px) {
@@ -189,6 +190,80 @@ TEST(FeatureNoise, OneMatchFarOffDoesNotRuinAFeatureAndWhatIsNoNumberTellsNothin
   EXPECT_EQ(noise.factor(), before);
   noise.learn(Eigen::Vector2d(1e6, 0.0), 0.05);
   EXPECT_LT(noise.factor(), 2.0 * before);
+}
+
+/// Errors of unit variance per axis, of which that share goes on from match to match (an
+/// autoregression of first order) and the rest is anew.
+FeatureNoise featureThatErrsForLong(double lasting_share, int matches, unsigned seed) {
+  constexpr double kGoesOn = 0.95;
+  std::mt19937 generator(seed);
+  const auto lasts =
+      gaussian(std::sqrt(lasting_share * (1.0 - kGoesOn * kGoesOn)), matches, &generator);
+  const auto anew = gaussian(std::sqrt(1.0 - lasting_share), matches, &generator);
+  FeatureNoise noise;
+  Eigen::Vector2d lasting = Eigen::Vector2d::Zero();
+  for (int k = 0; k < matches; ++k) {
+    lasting = kGoesOn * lasting + lasts[k];
+    noise.learn(lasting + anew[k], 1.0);
+  }
+  return noise;
+}
+
+double lastingOnAverage(double lasting_share) {
+  double sum = 0.0;
+  for (unsigned seed = 0; seed < 50; ++seed)
+    sum += featureThatErrsForLong(lasting_share, 600, seed).lasting().value() / 50.0;
+  return sum;
+}
+
+TEST(FeatureNoise, TellsErrorsThatLastFromSuchThatAreAnew) {
+  EXPECT_NEAR(lastingOnAverage(0.0), 1.0, 0.1);
+  // The variance of the average of independent errors is w / (2 - w) for the weight w = 1/8 of the
+  // newest, of those that go on by a that times (1 + (1 - w) a) / (1 - (1 - w) a).
+  const double longer = (1.0 + 0.875 * 0.95) / (1.0 - 0.875 * 0.95);
+  EXPECT_NEAR(lastingOnAverage(1.0), longer, 0.15 * longer);
+  EXPECT_NEAR(lastingOnAverage(0.5), 0.5 + 0.5 * longer, 0.08 * longer);
+}
+
+TEST(FeatureNoise, WhatLastsIsThatOfMostUntilThereIsEnoughToTell) {
+  FeatureNoise noise;
+  EXPECT_FALSE(noise.lasting());
+  EXPECT_EQ(noise.lastingLikeMost(4.0), 1.0);
+  noise.learn(Eigen::Vector2d(3.0, 3.0), 1.0);
+  EXPECT_FALSE(noise.lasting());
+  EXPECT_GT(noise.lastingLikeMost(4.0), 1.0);
+  EXPECT_LT(noise.lastingLikeMost(4.0), 1.1);
+  noise.learn(not_a_number, 1.0);
+  EXPECT_TRUE(std::isfinite(noise.lastingLikeMost(4.0)));
+  noise.learn(Eigen::Vector2d(1e6, 0.0), 1.0);  // one that is far off does not ruin it
+  EXPECT_LT(noise.lastingLikeMost(4.0), 3.0);
+}
+
+TEST(MatchNoise, AFeatureWhoseErrorsLastIsNoisierLastsLongerAndWandersMore) {
+  const FilterOptions options;
+  std::mt19937 generator(1);
+  MatchNoise noise;
+  for (int k = 0; k < 50; ++k) noise.learn(gaussian(0.05, 50, &generator));
+  noise.seeMotion(std::vector<double>(20, 1.0));
+  const FeatureNoise lasting = featureThatErrsForLong(0.9, 600, 1);
+  const FeatureNoise anew = featureThatErrsForLong(0.0, 600, 1);
+  EXPECT_EQ(noise.lastingLikeMost(lasting), 1.0) << "nothing is known of most";
+  noise.learnLasting({lasting.lasting().value()});
+  EXPECT_EQ(noise.lastingLikeMost(lasting), 1.0) << "one feature tells nothing of most";
+  noise.learnLasting(std::vector<double>(20, 2.5));
+
+  EXPECT_EQ(noise.lastingLikeMost(FeatureNoise()), 1.0);
+  EXPECT_GT(noise.lastingLikeMost(lasting), 1.5);
+  EXPECT_LT(noise.lastingLikeMost(anew), 0.8);
+  const double most = noise.repetitions(FeatureNoise());
+  EXPECT_GT(noise.repetitions(lasting), 1.1 * most);
+  EXPECT_LT(noise.repetitions(anew), 0.9 * most);
+  EXPECT_GE(noise.repetitions(anew), 1.0);
+  EXPECT_GT(noise.sigma_px(options, lasting),
+            1.1 * lasting.factor() * noise.sigma_px(options, FeatureNoise()));
+  EXPECT_LT(noise.sigma_px(options, anew),
+            0.9 * anew.factor() * noise.sigma_px(options, FeatureNoise()));
+  EXPECT_GT(noise.wanderLikeMost(lasting), 1.2 * lasting.factor());
 }
 
 TEST(MatchNoise, OfAFeatureIsInProportionToItsOwnButNotBelowTheLeast) {

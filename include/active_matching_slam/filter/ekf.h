@@ -31,6 +31,9 @@ struct FeatureMeasurement {
   double repetitions = 1.0;
   /// Covariance of its error over sigma_px^2 (trace 2).
   Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
+  /// Variance of the part of its error that lasts, in that of most matches: where many images of
+  /// its feature are taken together, as the start's adjustment does, this is what is left of it.
+  double lasting = 1.0;
 };
 
 struct UpdateReport {

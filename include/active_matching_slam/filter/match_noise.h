@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "active_matching_slam/filter/filter_options.h"
@@ -10,7 +11,8 @@ namespace active_matching_slam {
 /// How much more or less noisy the matches of one feature are than most: some corners are cleaner
 /// than others, and where something near hides something far there is no point to be found. By what
 /// is left between image and template, and by what updates leave over about the last hundred
-/// matches; like others, until there are enough to tell.
+/// matches; like others, until there are enough to tell. Where the patch is not what it is taken
+/// for, matches are off to the same side for long, and that one can see, too.
 class FeatureNoise {
  public:
   /// `sigma_px` of a match as its image tells it (SearchMatch::sigma_px), over
@@ -23,12 +25,24 @@ class FeatureNoise {
   /// Standard deviation of this feature's matches as updates show it, in what was expected.
   double factor() const;
 
+  /// Variance of the average of some matches in a row, in what it would be if their errors were
+  /// independent and as large as what frames showed. Empty: too few to tell.
+  std::optional<double> lasting() const;
+  /// The same, in that of most (`of_most` > 0), which is what it is taken for until there are
+  /// enough.
+  double lastingLikeMost(double of_most) const;
+
   /// Average of what images told, as a standard deviation [px]; 0: nothing yet.
   double seen_px() const;
 
  private:
+  void learnLasting(Eigen::Vector2d in_shown);
+
   double sum_ = 0.0;    ///< of squared residuals per axis, in what their frames showed
   double count_ = 0.0;  ///< of matches
+  Eigen::Vector2d recent_ = Eigen::Vector2d::Zero();  ///< average of the last few residuals
+  double recent_variance_ = 0.0;                      ///< of that, if they were independent
+  double lasting_sum_ = 0.0;                          ///< of its squares per axis, in that
   double seen_px2_ = 0.0;
   int seen_ = 0;
 };
@@ -52,8 +66,16 @@ class MatchNoise {
   /// where it falls and how it is seen and lit stays the same. Too few tell nothing.
   void seeMotion(std::vector<double> motions_px);
 
-  /// FeatureMeasurement::repetitions of the present image's matches, as seeMotion() had it.
-  double repetitions() const;
+  /// `lasting`: FeatureNoise::lasting() of the features matched that can tell it. Too few tell
+  /// nothing.
+  void learnLasting(std::vector<double> lasting);
+
+  /// Variance of the part of a feature's errors that lasts, in that of most.
+  double lastingLikeMost(const FeatureNoise& feature) const;
+
+  /// FeatureMeasurement::repetitions of the feature's match in the present image, as seeMotion()
+  /// had that.
+  double repetitions(const FeatureNoise& feature) const;
 
   /// What the present image tells of its matches (SearchMatch::sigma_px, known ones). Too few tell
   /// nothing: it is like most.
@@ -68,8 +90,8 @@ class MatchNoise {
   double likeMost(const FeatureNoise& feature) const;
 
   /// By how much more or less than most a corner wanders as the view of it turns: in proportion to
-  /// its matches' noise, as rendered scenes have it, but that one which looks clean hardly wanders
-  /// is not counted upon.
+  /// its matches' noise, as rendered scenes have it, and to what of it lasts, but that one which
+  /// looks clean hardly wanders is not counted upon.
   double wanderLikeMost(const FeatureNoise& feature) const;
 
   /// Standard deviation per axis [px] for most matches, not above FilterOptions::sigma_px and,
@@ -85,6 +107,7 @@ class MatchNoise {
   double shown_px2_ = 0.0;  ///< average variance, in an image like most
   double seen_px_ = 0.0;    ///< average of what images tell of most matches; 0: nothing yet
   double of_image_ = 1.0;
+  double lasting_ = 0.0;      ///< average FeatureNoise::lasting() of most; 0: nothing yet
   int updates_ = 0;           ///< that told something
   double same_images_ = 1.0;  ///< that show the same
 };
