@@ -6,6 +6,7 @@
 
 #include "active_matching_slam/filter/quantile.h"
 #include "active_matching_slam/filter/rotation.h"
+#include "active_matching_slam/filter/start_unit.h"
 
 namespace active_matching_slam {
 namespace {
@@ -17,9 +18,7 @@ double depthSigma(const Ekf& filter, const std::vector<FeatureState>& features) 
   std::vector<double> sigmas;
   for (const FeatureState& feature : features) {
     const FeatureState& known = *filter.find(feature.id);
-    const Eigen::Vector3d position = known.position();
-    const double variance = position.dot(filter.positionCovariance(known) * position);
-    sigmas.push_back(std::sqrt(std::max(variance, 0.0)) / position.squaredNorm());
+    sigmas.push_back(relativeLengthSigma(known.position(), filter.positionCovariance(known)));
   }
   return medianOf(std::move(sigmas));
 }

@@ -175,6 +175,14 @@ void alignRotation(const CameraModel& model, int index, Bundle* bundle) {
   camera.q_world_camera = Eigen::Quaterniond(R).normalized();
 }
 
+void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle) {
+  for (FeatureState& feature : bundle->features) feature.inverse_depth = inverse_depth;
+  for (std::size_t k = 1; k < bundle->cameras.size(); ++k) {
+    bundle->cameras[k].position_world.setZero();
+    alignRotation(model, static_cast<int>(k), bundle);
+  }
+}
+
 void reverseDepths(const CameraModel& model, Bundle* bundle) {
   constexpr double kLeastShare = 0.1;  // of the mean, that a mirrored inverse depth keeps
   double mean = 0.0;

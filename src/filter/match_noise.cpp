@@ -39,6 +39,11 @@ constexpr double kMostSigmas = 10.0;  ///< that one match says
 constexpr double kRecentWeight = 0.125;     ///< of one match in the average of some in a row
 constexpr double kEnoughForLasting = 30.0;  ///< matches
 
+/// An average over time that begins with its first value; `before` 0: there is none.
+double averaged(double before, double now, double weight) {
+  return before > 0.0 ? before + weight * (now - before) : now;
+}
+
 }  // namespace
 
 double MatchNoise::learn(const std::vector<Eigen::Vector2d>& residuals_px) {
@@ -66,14 +71,13 @@ void MatchNoise::see(std::vector<double> sigmas_px) {
   of_image_ = 1.0;
   if (sigmas_px.size() < kLeastMatches) return;
   const double now_px = medianOf(std::move(sigmas_px));
-  seen_px_ += (seen_px_ > 0.0 ? kLeastWeightSeen : 1.0) * (now_px - seen_px_);
+  seen_px_ = averaged(seen_px_, now_px, kLeastWeightSeen);
   if (seen_px_ > 0.0) of_image_ = std::clamp(now_px / seen_px_, kSharpest, kMostBlurred);
 }
 
 void MatchNoise::learnLasting(std::vector<double> lasting) {
   if (lasting.size() < kLeastMatches) return;
-  const double now = medianOf(std::move(lasting));
-  lasting_ += (lasting_ > 0.0 ? kLastingWeight : 1.0) * (now - lasting_);
+  lasting_ = averaged(lasting_, medianOf(std::move(lasting)), kLastingWeight);
 }
 
 double MatchNoise::lastingLikeMost(const FeatureNoise& feature) const {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "active_matching_slam/filter/match_motion.h"
@@ -33,10 +32,6 @@ constexpr double kRoughGain = 1e-2, kGainOnTheWay = 3e-3;
 constexpr int kStepsForOneMore = 2;  ///< once all but the last image are adjusted
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
-constexpr double kLeastOfUnit = 0.5;  ///< that is still seen of what told the unit of length
-/// Of what lengths are uncertain by, what their unit is: logarithms are not linear.
-constexpr double kShareOfUnit = 0.01;
-constexpr double kShareOfLengths = 0.03;    ///< of what lengths are uncertain by, that makes none
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
 constexpr double kSettlingLead = 20.0, kSettlingParallaxPx = 2.0;
@@ -74,13 +69,6 @@ FeatureState seenFromOrigin(const FeatureState& feature) {
   seen.inverse_depth = weight / ray.norm();
   seen.tangent_world = seen.bearing_world.unitOrthogonal();
   return seen;
-}
-
-/// Of the distance that the camera is from where it began.
-double relativeSigmaOfWay(const Ekf& filter) {
-  const Eigen::Vector3d way = filter.camera().position_world;
-  const double variance = way.dot(filter.cameraCovariance().topLeftCorner<3, 3>() * way);
-  return std::sqrt(std::max(variance, 0.0)) / way.squaredNorm();
 }
 
 /// Whether every image shows enough, and shares enough with the one before to hang together.
@@ -134,8 +122,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
   features_.clear();
   adjusted_.clear();
-  unit_shares_.clear();
-  length_sigma_ = std::numeric_limits<double>::infinity();
+  unit_.reset();
   has_left_first_ = is_settled_ = false;
   least_motion_px_ = 1.0;
   last_parallax_px_ = next_parallax_px_ = 0.0;
@@ -381,58 +368,21 @@ std::optional<StartAdjustment::Weighed> StartAdjustment::weigh(const CameraModel
   return all;
 }
 
-/// The one before, by those features that the filter still has: it is as uncertain as what is gone
-/// leaves it in the filter's map. Chosen anew when most of what counted is gone, or as long as
-/// lengths were so vague that another unit makes no difference to what was told in this one.
-StartAdjustment::Unit StartAdjustment::unitOf(const CameraModel& model, const Ekf& filter,
-                                              const Weighed& weighed) const {
-  const std::vector<FeatureId>& ids = weighed.reading.ids;
-  const double sigma = std::min(Ekf::kFreeScaleSigma, kShareOfUnit * length_sigma_);
-  Unit anew{depthShares(model, weighed.options, weighed.reading.bundle), sigma};
-  if (unit_shares_.empty()) return anew;
-  Unit kept{Eigen::VectorXd::Zero(anew.shares.size()), sigma, true};
-  auto known = unit_shares_.begin();
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (filter.find(ids[i]) == nullptr) {
-      anew.shares[row] = 0.0;
-      continue;
-    }
-    while (known != unit_shares_.end() && known->first < ids[i]) ++known;
-    if (known != unit_shares_.end() && known->first == ids[i]) kept.shares[row] = known->second;
-  }
-  anew.shares /= anew.shares.sum();
-  const double sigma_anew = filter.sigmaMeanLogDistance(ids, anew.shares);
-  if (sigma_anew < kShareOfLengths * length_sigma_) return anew;
-  const double left = kept.shares.sum();
-  if (left < kLeastOfUnit) {
-    anew.sigma = std::hypot(anew.sigma, sigma_anew);
-    return anew;
-  }
-  kept.shares /= left;
-  kept.sigma = std::hypot(kept.sigma, filter.sigmaMeanLogDistance(ids, kept.shares));
-  return kept;
-}
-
 /// The filter's state by what was weighed, unless the filter knows more.
 std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, const Ekf& filter,
                                                     Weighed weighed) {
   Reading& reading = weighed.reading;
   const bool is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
   // The unit of length stays. Of depths that were guessed only the middle means something.
-  length_sigma_ = std::min(length_sigma_, relativeSigmaOfWay(filter));
-  const Unit unit = unitOf(model, filter, weighed);
-  rescaleBundle(unit_shares_.empty() ? medianDepthFactor(weighed.believed, reading.bundle)
-                                     : depthFactor(unit.shares, weighed.believed, reading.bundle),
+  const StartUnit::Choice unit =
+      unit_.choose(filter, reading.ids, depthShares(model, weighed.options, reading.bundle));
+  rescaleBundle(unit_.isChosen() ? depthFactor(unit.shares, weighed.believed, reading.bundle)
+                                 : medianDepthFactor(weighed.believed, reading.bundle),
                 &reading.bundle);
   auto start = makeAdjustedStart(model, filter, weighed.options, reading.bundle, reading.ids,
                                  unit.shares, unit.sigma, images_.back().interval_s);
   if (!start) return std::nullopt;
-  if (!unit.is_kept) {
-    unit_shares_.clear();
-    for (std::size_t i = 0; i < reading.ids.size(); ++i)
-      unit_shares_.emplace_back(reading.ids[i], unit.shares[static_cast<Eigen::Index>(i)]);
-  }
+  unit_.adopt(reading.ids, unit);
   if (reading.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();
     return std::nullopt;

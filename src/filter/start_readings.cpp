@@ -72,15 +72,6 @@ Bundle allImages(const Bundle& some, const Bundle& bundle) {
   return all;
 }
 
-/// All at one depth, and cameras that only turned.
-void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle) {
-  for (FeatureState& feature : bundle->features) feature.inverse_depth = inverse_depth;
-  for (std::size_t k = 1; k < bundle->cameras.size(); ++k) {
-    bundle->cameras[k].position_world.setZero();
-    alignRotation(model, static_cast<int>(k), bundle);
-  }
-}
-
 /// Image points in all images.
 double countPoints(const Bundle& bundle) {
   std::size_t points = 0;

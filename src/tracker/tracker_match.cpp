@@ -264,11 +264,12 @@ void Tracker::Implementation::learnNoise(const UpdateReport& report) {
   }
   const double shown_px = match_noise_.learn(residuals_px);
   if (!(shown_px > 0.0)) return;
-  for (std::size_t i = 0; i < fused_.size(); ++i)
-    map_.learnNoise(fused_[i].id, residuals_px[i], shown_px);
   std::vector<double> lasting;
-  for (const FeatureMeasurement& match : fused_)
-    if (const auto known = map_.find(match.id)->noise.lasting()) lasting.push_back(*known);
+  for (std::size_t i = 0; i < fused_.size(); ++i) {
+    const FeatureId id = fused_[i].id;
+    map_.learnNoise(id, residuals_px[i], shown_px);
+    if (const auto known = map_.find(id)->noise.lasting()) lasting.push_back(*known);
+  }
   match_noise_.learnLasting(std::move(lasting));
 }
 

@@ -11,19 +11,10 @@ namespace {
 
 class StartDirections : public ::testing::Test {
  protected:
-  /// First and last image of `truth`, of a camera that only turned past things all at one depth.
-  Bundle turned(const Bundle& truth) const {
-    Bundle bundle = truth;
-    for (FeatureState& feature : bundle.features) feature.inverse_depth = options_.inverse_depth;
-    for (std::size_t k = 1; k < bundle.cameras.size(); ++k) {
-      bundle.cameras[k].position_world.setZero();
-      alignRotation(model_, static_cast<int>(k), &bundle);
-    }
-    return bundle;
-  }
-
   std::vector<Bundle> readings(const Bundle& truth) const {
-    return readingsByDirection(model_, options_, turned(truth));
+    Bundle turned = truth;
+    flatten(model_, options_.inverse_depth, &turned);
+    return readingsByDirection(model_, options_, turned);
   }
 
   const CameraModel model_{exampleCalibration()};

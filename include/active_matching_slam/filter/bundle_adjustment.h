@@ -85,6 +85,9 @@ std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle
 /// The same by images. No point counts for more than `most_px`; zero where there is none.
 std::vector<double> imageErrors(const CameraModel& model, const Bundle& bundle, double most_px);
 
+/// The reading of the same images by a camera that only turned, past features all at one depth.
+void flatten(const CameraModel& model, double inverse_depth, Bundle* bundle);
+
 /// The reading of the same images with near and far exchanged, which a narrow view or little
 /// parallax can hardly tell from the first (the bas-relief ambiguity; Belhumeur et al. 1999):
 /// inverse depths mirrored at their mean, the camera's path reversed, turned to fit.

@@ -9,6 +9,7 @@
 #include "active_matching_slam/camera/camera_model.h"
 #include "active_matching_slam/filter/bundle_adjustment.h"
 #include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/filter/start_unit.h"
 
 namespace active_matching_slam {
 
@@ -97,13 +98,6 @@ class StartAdjustment {
     BundleOptions options;
   };
 
-  /// Of length: the mean log distance from the first camera.
-  struct Unit {
-    Eigen::VectorXd shares;  ///< of the features; sum 1
-    double sigma = 0.0;      ///< of that mean, where the unit before is one
-    bool is_kept = false;    ///< the one before
-  };
-
   void thinOut();
   void rememberFeatures(const Ekf& filter);
   std::optional<double> parallax(const CameraModel& model);
@@ -116,7 +110,6 @@ class StartAdjustment {
                    const std::vector<FeatureId>& ids) const;
   std::optional<Weighed> weigh(const CameraModel& model, const Ekf& filter,
                                const Reading& chosen) const;
-  Unit unitOf(const CameraModel& model, const Ekf& filter, const Weighed& weighed) const;
   std::optional<AdjustedStart> adopt(const CameraModel& model, const Ekf& filter, Weighed weighed);
   void takeOver(const Reading& reading, AdjustedStart* start);
 
@@ -126,9 +119,7 @@ class StartAdjustment {
   std::vector<FeatureState> features_;
   std::optional<Reading> chosen_;    ///< at the image before, for the next step
   std::vector<FeatureId> adjusted_;  ///< features that took part when adjusted last, ascending
-  /// What features count in the unit of length, as it was chosen last; ascending id.
-  std::vector<std::pair<FeatureId, double>> unit_shares_;
-  double length_sigma_ = 0.0;    ///< relative, of the way from the first camera; the least so far
+  StartUnit unit_;
   bool has_left_first_ = false;  ///< the last image shares too little with the first
   bool is_settled_ = false;      ///< what the filter was given has no opposite any more
   double least_motion_px_ = 1.0;
