@@ -140,10 +140,10 @@ TEST(MatchNoise, ErrorsLastTheLongerTheLessTheImageMoves) {
   EXPECT_EQ(noise.repetitions(feature), 1.0);
   noise.seeMotion(std::vector<double>(20, 200.0));
   EXPECT_EQ(noise.repetitions(feature), 1.0);
-  noise.seeMotion(std::vector<double>(20, 0.8));
+  noise.seeMotion(std::vector<double>(20, 2.0));
   const double moving = noise.repetitions(feature);
   EXPECT_GT(moving, 1.5);
-  noise.seeMotion(std::vector<double>(20, 0.2));
+  noise.seeMotion(std::vector<double>(20, 0.5));
   const double slow = noise.repetitions(feature);
   EXPECT_GT(slow, 2.0 * moving);
   noise.seeMotion(std::vector<double>(20, 0.0));  // not for ever
@@ -244,7 +244,7 @@ TEST(MatchNoise, AFeatureWhoseErrorsLastIsNoisierLastsLongerAndWandersMore) {
   std::mt19937 generator(1);
   MatchNoise noise;
   for (int k = 0; k < 50; ++k) noise.learn(gaussian(0.05, 50, &generator));
-  noise.seeMotion(std::vector<double>(20, 0.4));
+  noise.seeMotion(std::vector<double>(20, 1.0));
   const FeatureNoise lasting = featureThatErrsForLong(0.9, 600, 1);
   const FeatureNoise anew = featureThatErrsForLong(0.0, 600, 1);
   EXPECT_EQ(noise.lastingLikeMost(lasting), 1.0) << "nothing is known of most";
