@@ -6,7 +6,6 @@
 
 #include "active_matching_slam/filter/quantile.h"
 #include "active_matching_slam/filter/rotation.h"
-#include "active_matching_slam/filter/start_unit.h"
 
 namespace active_matching_slam {
 namespace {
@@ -34,6 +33,10 @@ double depthSigma(const AdjustedStart& start) {
 }
 
 }  // namespace
+
+double relativeLengthSigma(const Eigen::Vector3d& way, const Eigen::Matrix3d& covariance) {
+  return std::sqrt(std::max(way.dot(covariance * way), 0.0)) / way.squaredNorm();
+}
 
 Eigen::Isometry3d AdjustedStart::corrected(std::int64_t image,
                                            const Eigen::Isometry3d& T_world_camera) const {

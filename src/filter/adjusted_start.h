@@ -8,6 +8,9 @@
 
 namespace active_matching_slam {
 
+/// Relative standard deviation of the length of `way` [m], whose covariance is `covariance` [m^2].
+double relativeLengthSigma(const Eigen::Vector3d& way, const Eigen::Matrix3d& covariance);
+
 /// The state that a filter would have after the images of `bundle`, the last of which was taken
 /// `interval_s` after the one before: mean and covariance of the last camera, its velocities, the
 /// calibration, and of those features that `filter` has. `ids` are the bundle's features',

@@ -8,7 +8,10 @@ namespace active_matching_slam {
 namespace {
 
 /// Most of what is known of something that one feature is taken to tell.
-constexpr double kMostShare = 0.9;
+constexpr double kMostShare = 0.99;
+/// What image points miss shows how much the last camera scatters, too: errors that last make it so
+/// many times as much (by NEES over rendered runs), which counts like what so many features show.
+constexpr double kScatterByMisses = 2.7, kFeaturesForMisses = 4.0;
 
 /// How much more the last camera scatters, by what the features show, than A^-1 says for the
 /// information A: its rotation, and its position across the way from the first, which no unit of
@@ -38,15 +41,18 @@ double scatterOfLastCamera(const CameraModel& model, const BundleOptions& option
     const Eigen::SelfAdjointEigenSolver<Matrix> shares(pull.information);
     const Eigen::Array<double, kLastPoseSize, 1> moved =
         shares.eigenvectors().transpose() * pull.gradient;
+    // By errors as said it would be the feature's shares (Bell and McCaffrey 2002).
     const double square =
-        (moved / (1.0 - shares.eigenvalues().array().min(kMostShare))).square().sum();
+        (moved.square() / (1.0 - shares.eigenvalues().array().min(kMostShare))).sum();
     squares += square;
     of_squares += square * square;
   }
   if (!(squares > 0.0)) return 1.0;
-  // Few features show it: errors are larger, in what is shown, than in what is.
-  squares += of_squares / squares;
-  return pulls.yielding * pulls.yielding * squares / kLastPoseSize;
+  const double shown_by = squares * squares / of_squares;  // so many features
+  const double by_features = squares / kLastPoseSize, by_misses = kScatterByMisses * pulls.missed;
+  return pulls.yielding * pulls.yielding *
+         (kFeaturesForMisses * by_misses + shown_by * by_features) /
+         (kFeaturesForMisses + shown_by);
 }
 
 }  // namespace

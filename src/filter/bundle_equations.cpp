@@ -148,7 +148,10 @@ FeaturePulls pullsOfFeatures(const CameraModel& model, const BundleOptions& opti
   const int readout = 6 * (static_cast<int>(bundle.cameras.size()) - 1);
   FeaturePulls pulls;
   pulls.features.resize(bundle.features.size());
-  double weights = 0.0, slopes = 0.0;
+  double weights = 0.0, slopes = 0.0, squares = 0.0;
+  // One less for each that is estimated.
+  double degrees = -6.0 * static_cast<double>(bundle.cameras.size() - 1) -
+                   3.0 * static_cast<double>(bundle.features.size());
   for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
     const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
     for (const BundleObservation& o : bundle.observations[k]) {
@@ -156,6 +159,8 @@ FeaturePulls pullsOfFeatures(const CameraModel& model, const BundleOptions& opti
       if (!point) continue;
       weights += point->robust;
       slopes += point->robust * point->robust;
+      squares += point->residual_px.dot(point->information * point->residual_px);
+      degrees += 2.0;
       Eigen::Matrix<double, kLastPoseSize, 2> J =
           map.col(readout) * o.d_calibration.col(0).transpose();
       if (k > 0) J += map.middleCols<6>(6 * static_cast<int>(k - 1)) * point->d_pose.transpose();
@@ -173,6 +178,7 @@ FeaturePulls pullsOfFeatures(const CameraModel& model, const BundleOptions& opti
     pull.information -= J * J.transpose();
   }
   if (slopes > 0.0) pulls.yielding = weights / slopes;
+  if (degrees > 0.0) pulls.missed = squares / degrees;
   return pulls;
 }
 

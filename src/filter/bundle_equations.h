@@ -65,6 +65,8 @@ struct FeaturePulls {
   /// By how much more a minimum yields than the information says: the slope of a robust function
   /// falls below its weight.
   double yielding = 1.0;
+  /// Variance of what image points miss, in what is said, per degree of freedom.
+  double missed = 0.0;
 };
 
 /// Through `map`, 5 x (6K + 1).

@@ -185,21 +185,6 @@ Eigen::Matrix3d Ekf::positionCovariance(const FeatureState& feature) const {
   return 0.5 * (covariance + covariance.transpose());
 }
 
-double Ekf::sigmaMeanLogDistance(const std::vector<FeatureId>& ids,
-                                 const Eigen::VectorXd& shares) const {
-  // A rotation of the world about its origin, which is in each feature's error, changes nothing.
-  Eigen::VectorXd functional = Eigen::VectorXd::Zero(stateSize());
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const double share = shares[static_cast<Eigen::Index>(i)];
-    if (share == 0.0) continue;
-    const FeatureState& feature = *find(ids[i]);
-    const Eigen::Vector3d position = feature.position();
-    functional.segment(feature.offset, feature.size()) +=
-        share / position.squaredNorm() * (positionJacobian(feature).transpose() * position);
-  }
-  return std::sqrt(std::max(functional.dot(covariance_.view() * functional), 0.0));
-}
-
 double Ekf::sigmaInverseDepth(const FeatureState& feature) const {
   if (feature.kind == FeatureKind::kPoint) return 0.0;
   const int row = feature.inverseDepthRow();

@@ -33,6 +33,8 @@ constexpr int kStepsForOneMore = 2;  ///< once all but the last image are adjust
 /// The cleanest features count for this much noise of most, so that the rest tell something too.
 constexpr double kCleanestNoise = 0.4;
 constexpr double kParallaxToTrustPx = 5.0;  ///< from it on the filter may know more than the images
+/// Of what lengths are uncertain by, what their unit is, and the most: logarithms are not linear.
+constexpr double kShareOfUnit = 0.1, kMostSigmaOfUnit = 0.01;
 /// With so much parallax, a reading that leads by so many times what it needs to is settled.
 constexpr double kSettlingLead = 20.0, kSettlingParallaxPx = 2.0;
 
@@ -122,7 +124,7 @@ void StartAdjustment::begin(std::int64_t index, const std::vector<FeatureMeasure
   images_.assign(1, {index, 0.0, CameraState(), first, zeros(first.size())});
   features_.clear();
   adjusted_.clear();
-  unit_.reset();
+  length_sigma_.reset();
   has_left_first_ = is_settled_ = false;
   least_motion_px_ = 1.0;
   last_parallax_px_ = next_parallax_px_ = 0.0;
@@ -373,16 +375,23 @@ std::optional<AdjustedStart> StartAdjustment::adopt(const CameraModel& model, co
                                                     Weighed weighed) {
   Reading& reading = weighed.reading;
   const bool is_refinement = last_parallax_px_ >= kParallaxToTrustPx;
-  // The unit of length stays. Of depths that were guessed only the middle means something.
-  const StartUnit::Choice unit =
-      unit_.choose(filter, reading.ids, depthShares(model, weighed.options, reading.bundle));
-  rescaleBundle(unit_.isChosen() ? depthFactor(unit.shares, weighed.believed, reading.bundle)
-                                 : medianDepthFactor(weighed.believed, reading.bundle),
+  // The unit of length: the mean of log depths stays, in which each counts what is now known of it.
+  Eigen::VectorXd shares = depthShares(model, weighed.options, reading.bundle);
+  for (std::size_t i = 0; i < reading.ids.size(); ++i)
+    if (filter.find(reading.ids[i]) == nullptr) shares[static_cast<Eigen::Index>(i)] = 0.0;
+  shares /= shares.sum();
+  // Of depths that were guessed only the middle means something.
+  rescaleBundle(length_sigma_ ? depthFactor(shares, weighed.believed, reading.bundle)
+                              : medianDepthFactor(weighed.believed, reading.bundle),
                 &reading.bundle);
+  const double sigma = relativeLengthSigma(filter.camera().position_world,
+                                           filter.cameraCovariance().topLeftCorner<3, 3>());
+  const double length_sigma = std::min(length_sigma_.value_or(1.0), sigma);  // 1: not finite
   auto start = makeAdjustedStart(model, filter, weighed.options, reading.bundle, reading.ids,
-                                 unit.shares, unit.sigma, images_.back().interval_s);
+                                 shares, std::min(kShareOfUnit * length_sigma, kMostSigmaOfUnit),
+                                 images_.back().interval_s);
   if (!start) return std::nullopt;
-  unit_.adopt(reading.ids, unit);
+  length_sigma_ = length_sigma;
   if (reading.parallax_px >= kParallaxToTrustPx && knowsMore(filter, *start)) {
     end();
     return std::nullopt;

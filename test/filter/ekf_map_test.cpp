@@ -326,42 +326,6 @@ TEST_F(EkfMap, ConvertsWellKnownDepthsOnlyAndWithTheProperJacobian) {
   EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
 }
 
-TEST_F(EkfMap, TheSpreadOfTheMeanLogDistanceIsThatOfItsNumericalGradient) {
-  Ekf filter = exampleFilter(model_, 11);
-  filter.convertToPoints();
-  filter.addInverseDepthFeature(model_, Eigen::Vector2d(200.0, 150.0), 0.5, 0.1);
-  const int n = filter.stateSize();
-  std::vector<FeatureId> ids;
-  Eigen::VectorXd shares(filter.features().size());
-  for (std::size_t i = 0; i < filter.features().size(); ++i) {
-    ids.push_back(filter.features()[i].id);
-    shares[static_cast<Eigen::Index>(i)] = 1.0 + static_cast<double>(i);
-  }
-  shares /= shares.sum();
-  const auto mean = [&](const Eigen::VectorXd& error) {
-    CameraState camera = filter.camera();
-    std::vector<FeatureState> features = filter.features();
-    applyError(error, camera, features);
-    double sum = 0.0;
-    for (std::size_t i = 0; i < features.size(); ++i)
-      sum += shares[static_cast<Eigen::Index>(i)] * std::log(features[i].position().norm());
-    return sum;
-  };
-  Eigen::VectorXd gradient(n);
-  for (int i = 0; i < n; ++i) {
-    const Eigen::VectorXd step = 1e-5 * Eigen::VectorXd::Unit(n, i);
-    gradient[i] = (mean(step) - mean(-step)) / 2e-5;
-  }
-  const double expected = std::sqrt(gradient.dot(filter.covariance() * gradient));
-  EXPECT_GT(expected, 0.0);
-  EXPECT_NEAR(filter.sigmaMeanLogDistance(ids, shares), expected, 1e-6 * expected);
-  // One that is unknown, and counts nothing, changes nothing.
-  ids.push_back(filter.nextId());
-  shares.conservativeResize(shares.size() + 1);
-  shares.tail<1>().setZero();
-  EXPECT_NEAR(filter.sigmaMeanLogDistance(ids, shares), expected, 1e-6 * expected);
-}
-
 /// The same filter with rows for anchors at the origin too, about which nothing is uncertain.
 Ekf withAllAnchors(const Ekf& filter) {
   std::vector<FeatureState> features = filter.features();

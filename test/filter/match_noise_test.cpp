@@ -57,10 +57,10 @@ TEST(MatchNoise, FollowsTheBlurOfAnImageAtOnceAndForgetsItWithTheNext) {
   for (int k = 0; k < 200; ++k) image(0.03, 0.04);
   const double sharp = image(0.03, 0.04);
   EXPECT_EQ(noise.ofImage(), 1.0);
-  const double blurred = image(0.09, 0.12);
-  EXPECT_GT(blurred, 2.5 * sharp);
-  EXPECT_LT(blurred, 3.0 * sharp);
-  image(0.09, 0.12);
+  const double blurred = image(0.09, 0.16);  // matches suffer more than the templates' likeness
+  EXPECT_GT(blurred, 3.3 * sharp);
+  EXPECT_LT(blurred, 4.0 * sharp);
+  image(0.09, 0.16);
   EXPECT_NEAR(image(0.03, 0.04), sharp, 0.15 * sharp);
   noise.see({0.09, 0.09});  // too few: like most
   EXPECT_EQ(noise.ofImage(), 1.0);
@@ -140,10 +140,10 @@ TEST(MatchNoise, ErrorsLastTheLongerTheLessTheImageMoves) {
   EXPECT_EQ(noise.repetitions(feature), 1.0);
   noise.seeMotion(std::vector<double>(20, 200.0));
   EXPECT_EQ(noise.repetitions(feature), 1.0);
-  noise.seeMotion(std::vector<double>(20, 2.0));
+  noise.seeMotion(std::vector<double>(20, 1.6));
   const double moving = noise.repetitions(feature);
   EXPECT_GT(moving, 1.5);
-  noise.seeMotion(std::vector<double>(20, 0.5));
+  noise.seeMotion(std::vector<double>(20, 0.4));
   const double slow = noise.repetitions(feature);
   EXPECT_GT(slow, 2.0 * moving);
   noise.seeMotion(std::vector<double>(20, 0.0));  // not for ever
@@ -244,7 +244,7 @@ TEST(MatchNoise, AFeatureWhoseErrorsLastIsNoisierLastsLongerAndWandersMore) {
   std::mt19937 generator(1);
   MatchNoise noise;
   for (int k = 0; k < 50; ++k) noise.learn(gaussian(0.05, 50, &generator));
-  noise.seeMotion(std::vector<double>(20, 1.0));
+  noise.seeMotion(std::vector<double>(20, 0.8));
   const FeatureNoise lasting = featureThatErrsForLong(0.9, 600, 1);
   const FeatureNoise anew = featureThatErrsForLong(0.0, 600, 1);
   EXPECT_EQ(noise.lastingLikeMost(lasting), 1.0) << "nothing is known of most";

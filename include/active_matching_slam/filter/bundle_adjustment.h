@@ -64,9 +64,9 @@ double adjustBundle(const CameraModel& model, const BundleOptions& options, Bund
 /// rotation, 6 each, as in CameraError), of the calibration and then of all features (bearing and
 /// inverse depth, 3 each). Of the lens nothing is learnt: it is as uncertain as before and makes
 /// the rest so (a consider parameter; Schmidt 1966). With `scale_by_scatter` the noise of image
-/// points is what makes the last camera as uncertain as it would move, on the whole, if one feature
-/// or another were left out: the jackknife over clusters, in which errors may last from image to
-/// image (Cameron and Miller 2015, A Practitioner's Guide to Cluster-Robust Inference). The unit of
+/// points is what makes the last camera as uncertain as features and what they miss show: each is a
+/// cluster, in which errors may last from image to image (Bell and McCaffrey 2002; Cameron and
+/// Miller 2015, A Practitioner's Guide to Cluster-Robust Inference). The unit of
 /// length is that in which the mean logarithm of the inverse depths, weighted by `unit_shares` (of
 /// sum 1), is what it is, to `relative_scale_sigma`.
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,

@@ -137,10 +137,6 @@ class Ekf {
   }
   /// 3 x 3 covariance of a feature's position in the world (first order for inverse depth).
   Eigen::Matrix3d positionCovariance(const FeatureState& feature) const;
-  /// Standard deviation of the mean logarithm of the distances from the world's origin, in which
-  /// the features `ids` count `shares`; those that are unknown must count nothing.
-  double sigmaMeanLogDistance(const std::vector<FeatureId>& ids,
-                              const Eigen::VectorXd& shares) const;
   /// Standard deviation of rho, for kInverseDepth.
   double sigmaInverseDepth(const FeatureState& feature) const;
 

@@ -81,7 +81,7 @@ class MatchNoise {
   /// nothing: it is like most.
   void see(std::vector<double> sigmas_px);
 
-  /// Standard deviation of matches in the present image in that of most images.
+  /// What the present image tells of its matches, in what most images tell.
   double ofImage() const { return of_image_; }
 
   /// Standard deviation of a feature's matches in that of most, by what images told. What is left
@@ -101,6 +101,8 @@ class MatchNoise {
   double sigma_px(const FilterOptions& options, const FeatureNoise& feature) const;
 
  private:
+  /// Standard deviation of matches in the present image in that of most images.
+  double noiseOfImage() const;
   /// Standard deviation of a feature's matches in that of most, by all that is known of it.
   double inThatOfMost(const FeatureNoise& feature) const;
 

@@ -9,7 +9,6 @@
 #include "active_matching_slam/camera/camera_model.h"
 #include "active_matching_slam/filter/bundle_adjustment.h"
 #include "active_matching_slam/filter/ekf.h"
-#include "active_matching_slam/filter/start_unit.h"
 
 namespace active_matching_slam {
 
@@ -119,7 +118,8 @@ class StartAdjustment {
   std::vector<FeatureState> features_;
   std::optional<Reading> chosen_;    ///< at the image before, for the next step
   std::vector<FeatureId> adjusted_;  ///< features that took part when adjusted last, ascending
-  StartUnit unit_;
+  /// Relative, of the way from the first camera; the least at an adjustment so far.
+  std::optional<double> length_sigma_;
   bool has_left_first_ = false;  ///< the last image shares too little with the first
   bool is_settled_ = false;      ///< what the filter was given has no opposite any more
   double least_motion_px_ = 1.0;
