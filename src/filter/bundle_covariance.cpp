@@ -1,4 +1,5 @@
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "active_matching_slam/filter/triangular.h"
@@ -10,8 +11,14 @@ namespace {
 /// Most of what is known of something that one feature is taken to tell.
 constexpr double kMostShare = 0.99;
 /// What image points miss shows how much the last camera scatters, too: errors that last make it so
-/// many times as much (by NEES over rendered runs), which counts like what so many features show.
-constexpr double kScatterByMisses = 2.7, kFeaturesForMisses = 4.0;
+/// many times as much once there are so many images, less in fewer (by NEES over rendered runs),
+/// which counts like what so many features show.
+constexpr double kScatterByMisses = 2.6, kImagesForScatter = 12.0, kFeaturesForMisses = 4.0;
+
+double scatterByMisses(std::size_t images) {
+  const double share = (static_cast<double>(images) - 2.0) / (kImagesForScatter - 2.0);
+  return 1.0 + (kScatterByMisses - 1.0) * std::clamp(share, 0.0, 1.0);
+}
 
 /// How much more the last camera scatters, by what the features show, than A^-1 says for the
 /// information A: its rotation, and its position across the way from the first, which no unit of
@@ -49,7 +56,8 @@ double scatterOfLastCamera(const CameraModel& model, const BundleOptions& option
   }
   if (!(squares > 0.0)) return 1.0;
   const double shown_by = squares * squares / of_squares;  // so many features
-  const double by_features = squares / kLastPoseSize, by_misses = kScatterByMisses * pulls.missed;
+  const double by_features = squares / kLastPoseSize;
+  const double by_misses = scatterByMisses(bundle.cameras.size()) * pulls.missed;
   return pulls.yielding * pulls.yielding *
          (kFeaturesForMisses * by_misses + shown_by * by_features) /
          (kFeaturesForMisses + shown_by);

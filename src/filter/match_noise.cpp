@@ -16,7 +16,7 @@ constexpr std::size_t kLeastMatches = 8;
 constexpr double kLeastWeightShown = 0.6, kLeastWeightSeen = 0.05;
 /// The noise that matches are taken to have, but for their tails, in what updates show. (By NEES
 /// over rendered runs, as are the next.)
-constexpr double kShareOfShown = 0.81;
+constexpr double kShareOfShown = 0.77;
 /// Of the variance of matches, the share that lasts: the same patch is off in the same way, again.
 constexpr double kLastingShare = 0.5;
 /// Power of what features show of their lasting errors' variance by which these are larger, and the
@@ -25,14 +25,14 @@ constexpr double kLastingByShown = 0.75, kLeastLasting = 0.25, kMostLasting = 10
 constexpr double kLastingWeight = 0.05;  ///< of one image in what most show
 /// Motion of the image after which what lasts is another, and the most images that are taken to
 /// have it in common.
-constexpr double kFreshPx = 4.0, kMostSameImages = 15.0;
+constexpr double kFreshPx = 5.5, kMostSameImages = 15.0;
 /// Power of what images tell by which corners wander more. (By the same.)
 constexpr double kWanderByMisfit = 2.0;
 constexpr double kLeastWander = 0.7, kMostWander = 10.0;  ///< of a corner, in that of most
 constexpr double kSharpest = 0.2, kMostBlurred = 5.0;     ///< image, in what most tell
 /// Power of what an image tells by which its matches are noisier: blur leaves little to match by.
 /// (By what updates then show.)
-constexpr double kNoiseByMisfit = 1.25;
+constexpr double kNoiseByMisfit = 1.5;
 constexpr double kSigmaByMedian = 1.4826;  ///< of a Gaussian's absolute values
 
 constexpr double kSightWeight = 0.1;  ///< of one match in a feature's average, once there are many

@@ -19,6 +19,10 @@ constexpr double kNonlinearityTolerance = 0.2;
 constexpr double kTailDegrees = 4.0, kTailVariance = 1.18;
 constexpr double kTailTolerance = 0.02;  ///< of the variances
 constexpr int kMostTailRounds = 4;
+/// Degrees of freedom for which the noise common to an image's matches is taken to be as expected
+/// (by NEES over rendered runs), and of the innovation's square what it is in most images: cameras
+/// seldom move as jerkily as they are free to.
+constexpr double kDegreesLikeExpected = 80.0, kUsualInnovation = 0.85;
 
 }  // namespace
 
@@ -120,6 +124,20 @@ bool MeasurementUpdate::weighTails(const Eigen::VectorXd& weighted,
   return any;
 }
 
+/// An image whose matches disagree more than expected on the whole is noisier in all of them: the
+/// mean of what a prior as sure as so many degrees of freedom and the innovation's square leave of
+/// the scale (inverse gamma).
+void MeasurementUpdate::scaleNoise(Eigen::MatrixXd& S) {
+  const double degrees = 2.0 * static_cast<double>(measurements_.size());
+  const double scale =
+      (kDegreesLikeExpected + nis_ / kUsualInnovation) / (kDegreesLikeExpected + degrees);
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    const double change_px2 = (scale - 1.0) * measurements_[i].variance_px2;
+    measurements_[i].variance_px2 += change_px2;
+    S.block<2, 2>(2 * i, 2 * i) += change_px2 * measurements_[i].shape;
+  }
+}
+
 /// How noisy each measurement is, by the first innovation and the S of the noise expected, which
 /// then is that of the noise found. False when S could not be factorised.
 bool MeasurementUpdate::judgeNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S) {
@@ -132,6 +150,8 @@ bool MeasurementUpdate::judgeNoise(const Eigen::VectorXd& innovation, Eigen::Mat
   };
   if (!weigh()) return false;
   nis_ = innovation.dot(weighted);
+  scaleNoise(S);
+  if (!weigh()) return false;
   std::vector<double> variances_px2;
   for (const UsableMeasurement& m : measurements_) variances_px2.push_back(m.variance_px2);
   for (int round = 0; round < kMostTailRounds; ++round) {

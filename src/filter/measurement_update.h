@@ -22,12 +22,13 @@ using ImpulseRoot = Eigen::Matrix<double, CameraError::kMotionSize, 6>;
 
 /// The gain of one update, by repeated linearisation (Bell & Cathey 1993), with the noise of what
 /// linearisation leaves out and of errors that last; the impulse since the image before, once the
-/// rest is known so, with the noise of one image. Matches are
-/// more often far off than a Gaussian's: each has the variance that an error of the t distribution
-/// which is as large as what it and all others disagree by is weighed with (Lange, Little & Taylor
-/// 1989). All errors count from the prior mean; the Jacobian of an iteration is that of the mean
-/// reached. The second-order noise stays the prior's: shrunk along with the posterior it trusted
-/// the wrong one of two explanations of a small first move, depths reversed, for good.
+/// rest is known so, with the noise of one image. All of an image's matches are noisier, or less
+/// noisy, when they disagree more or less than expected on the whole. Matches are more often far
+/// off than a Gaussian's: each has the variance that an error of the t distribution which is as
+/// large as what it and all others disagree by is weighed with (Lange, Little & Taylor 1989). All
+/// errors count from the prior mean; the Jacobian of an iteration is that of the mean reached. The
+/// second-order noise stays the prior's: shrunk along with the posterior it trusted the wrong one
+/// of two explanations of a small first move, depths reversed, for good.
 class MeasurementUpdate {
  public:
   /// `X`: workspace, state size x 2 measurements. `calibration_share`: how much of its correction
@@ -59,6 +60,7 @@ class MeasurementUpdate {
   bool linearise();
   bool step(bool first);
   void addNoise(Eigen::MatrixXd& S);
+  void scaleNoise(Eigen::MatrixXd& S);
   bool judgeNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S);
   Eigen::Matrix<double, 6, Eigen::Dynamic> impulseGain(const Eigen::MatrixXd& B) const;
   bool weighTails(const Eigen::VectorXd& weighted, const std::vector<double>& variances_px2,

@@ -34,6 +34,9 @@ constexpr double kLeastNoiseLeft = 0.1;  ///< of a match's variance, for what is
 /// FeatureMeasurement::repetitions of matches that the start's adjustment will hear again: what it
 /// learns from them the filter need not.
 constexpr double kLearntByAdjustment = 1000.0;
+/// Their noise to the camera, in that of others: what of it lasts is its alone then. (By NEES over
+/// rendered runs.)
+constexpr double kNoiseWhileAdjusted = 1.27;
 /// Share of its velocity that a camera keeps from one frame without matches to the next: a hand
 /// that jerks does not go on for long.
 constexpr double kSlowingUnseen = 0.7;
@@ -307,6 +310,7 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
     match.lasting = match_noise_.lastingLikeMost(feature.noise);
     if (start_adjustment_.adjusts(match.id)) {
       match.repetitions = kLearntByAdjustment;
+      match.sigma_px *= kNoiseWhileAdjusted;
     } else if (!feature.known) {  // it lies where it was said to, whatever its first images showed
       match.repetitions = match_noise_.repetitions(feature.noise);
     }

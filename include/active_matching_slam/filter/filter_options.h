@@ -17,7 +17,7 @@ struct FilterOptions {
   double sigma_angular_acceleration_rps2 = 12.0;  ///< angular, per axis
   double sigma_px = 0.45;                         ///< measurement noise, per axis
   double minimum_sigma_px = 0.01;                 ///< of matches that show less; see MatchNoise
-  double corner_wander_px = 0.024;                ///< per axis and root of a radian; see Ekf
+  double corner_wander_px = 0.022;                ///< per axis and root of a radian; see Ekf
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
