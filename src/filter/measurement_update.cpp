@@ -19,10 +19,10 @@ constexpr double kNonlinearityTolerance = 0.2;
 constexpr double kTailDegrees = 4.0, kTailVariance = 1.18;
 constexpr double kTailTolerance = 0.02;  ///< of the variances
 constexpr int kMostTailRounds = 4;
-/// Degrees of freedom for which the noise common to an image's matches is taken to be as expected
-/// (by NEES over rendered runs), and of the innovation's square what it is in most images: cameras
-/// seldom move as jerkily as they are free to.
-constexpr double kDegreesLikeExpected = 80.0, kUsualInnovation = 0.85;
+/// Degrees of freedom for which the noise common to an image's matches is taken to be as expected,
+/// and the innovation's square, for each of its own, that says that it is. (By NEES over rendered
+/// runs.)
+constexpr double kDegreesLikeExpected = 80.0, kExpectedInnovation = 0.85;
 
 }  // namespace
 
@@ -130,7 +130,7 @@ bool MeasurementUpdate::weighTails(const Eigen::VectorXd& weighted,
 void MeasurementUpdate::scaleNoise(Eigen::MatrixXd& S) {
   const double degrees = 2.0 * static_cast<double>(measurements_.size());
   const double scale =
-      (kDegreesLikeExpected + nis_ / kUsualInnovation) / (kDegreesLikeExpected + degrees);
+      (kDegreesLikeExpected + nis_ / kExpectedInnovation) / (kDegreesLikeExpected + degrees);
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     const double change_px2 = (scale - 1.0) * measurements_[i].variance_px2;
     measurements_[i].variance_px2 += change_px2;
