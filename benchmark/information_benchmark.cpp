@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "../src/matching/joint.h"
+#include "active_matching_slam/evaluation/simulated_problem.h"
 #include "active_matching_slam/information/chow_liu_tree.h"
 #include "active_matching_slam/information/gaussian_information.h"
-#include "active_matching_slam/matching/simulated_problem.h"
 
 namespace active_matching_slam {
 namespace {

@@ -22,11 +22,11 @@
 #include <vector>
 
 #include "../src/matching/joint.h"
+#include "active_matching_slam/evaluation/simulated_problem.h"
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/information/chow_liu_tree.h"
 #include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/matcher.h"
-#include "active_matching_slam/matching/simulated_problem.h"
 
 namespace active_matching_slam {
 namespace {

@@ -19,7 +19,7 @@ if(CATKIN_ENABLE_TESTING)
   catkin_add_gtest(test_ros ${ros_tests}
     WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/test)
   target_include_directories(test_ros PRIVATE test)
-  target_link_libraries(test_ros ${PROJECT_NAME}_ros gtest_main)
+  target_link_libraries(test_ros ${PROJECT_NAME}_ros ams_offline gtest_main)
 
   # Tests with a master play a recording that is rendered when the tests are built.
   find_package(rostest REQUIRED)

@@ -24,8 +24,13 @@ foreach(name commands machines rosrun)
     "AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION};AMS_TEST_BAG=${test_bag};AMS_BUILT=${CMAKE_BINARY_DIR}")
 endforeach()
 
+add_test(NAME ${PROJECT_NAME}_house
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/include_graph_test.py)
+
 get_property(tests DIRECTORY PROPERTY TESTS)
 foreach(test ${tests})
+  # As in the node and the tools: results must not depend on the number of cores.
+  set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT OPENBLAS_NUM_THREADS=1)
   if(test MATCHES "_rostest_|_commands$|_machines$")
     set_tests_properties(${test} PROPERTIES RUN_SERIAL TRUE)
   elseif(test MATCHES "_test_accuracy$")

@@ -5,8 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "active_matching_slam/filter/rotation.h"
 #include "active_matching_slam/image/subpixel.h"
+#include "active_matching_slam/math/rotation.h"
 #include "recording.h"
 
 namespace active_matching_slam {

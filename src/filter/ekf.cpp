@@ -5,15 +5,13 @@
 #include <stdexcept>
 #include <string>
 
-#include "active_matching_slam/filter/rotation.h"
 #include "active_matching_slam/filter/state_error.h"
-#include "active_matching_slam/information/blas_threads.h"
+#include "active_matching_slam/math/rotation.h"
 
 namespace active_matching_slam {
 
 Ekf::Ekf(const FilterOptions& options) : options_(options) {
   checkFilterOptions(options);
-  useSingleThreadedBlas();
   covariance_.reset(CameraError::kSize);
 }
 

@@ -4,8 +4,8 @@
 
 #include "active_matching_slam/filter/ekf.h"
 #include "active_matching_slam/filter/measurement_model.h"
-#include "active_matching_slam/filter/rotation.h"
 #include "active_matching_slam/filter/state_error.h"
+#include "active_matching_slam/math/rotation.h"
 
 namespace active_matching_slam {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "active_matching_slam/filter/quantile.h"
+#include "active_matching_slam/math/quantile.h"
 
 namespace active_matching_slam {
 namespace {

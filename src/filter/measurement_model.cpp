@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "active_matching_slam/filter/rotation.h"
+#include "active_matching_slam/math/rotation.h"
 
 namespace active_matching_slam {
 namespace {

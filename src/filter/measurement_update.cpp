@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "active_matching_slam/filter/state_error.h"
-#include "active_matching_slam/filter/triangular.h"
+#include "active_matching_slam/math/triangular.h"
 
 namespace active_matching_slam {
 namespace {

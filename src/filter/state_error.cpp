@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "active_matching_slam/filter/rotation.h"
+#include "active_matching_slam/math/rotation.h"
 
 namespace active_matching_slam {
 namespace {

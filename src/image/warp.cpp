@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "active_matching_slam/filter/ekf.h"
 #include "sampling.h"
 
 namespace active_matching_slam {
@@ -94,17 +93,6 @@ std::optional<PatchPlane> planeOf(const SourcePatch& patch, const CameraModel& c
 }
 
 }  // namespace
-
-Eigen::Vector4d homogeneousPosition(const FeatureState& feature) {
-  Eigen::Vector4d point;
-  if (feature.kind == FeatureKind::kPoint) {
-    point << feature.point_world, 1.0;
-  } else {
-    const double rho = std::max(feature.inverse_depth, 0.0);
-    point << rho * feature.anchor_world + feature.bearing_world, rho;
-  }
-  return point;
-}
 
 std::optional<PatchView> predictFlatView(const SourcePatch& patch, const CameraModel& camera,
                                          const Eigen::Isometry3d& T_world_camera_now,

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "active_matching_slam/filter/quantile.h"
 #include "active_matching_slam/image/surface_slope.h"
+#include "active_matching_slam/math/quantile.h"
 
 namespace active_matching_slam {
 namespace {

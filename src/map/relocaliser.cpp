@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "active_matching_slam/filter/rotation.h"
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/image/warp.h"
 #include "active_matching_slam/matching/search_ellipse.h"
+#include "active_matching_slam/math/rotation.h"
 #include "orb_corners.h"
 
 namespace active_matching_slam {

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <limits>
 
+#include "active_matching_slam/math/chi_square.h"
+#include "active_matching_slam/math/slot.h"
 #include "baseline_matchers.h"
-#include "chi_square.h"
 #include "gate_search.h"
-#include "slot.h"
 
 namespace active_matching_slam {
 namespace {

@@ -2,7 +2,6 @@
 
 #include <stdexcept>
 
-#include "active_matching_slam/information/blas_threads.h"
 #include "baseline_matchers.h"
 #include "mixture_matchers.h"
 
@@ -15,7 +14,6 @@ const std::vector<std::string>& matcherNames() {
 }
 
 std::unique_ptr<Matcher> createMatcher(const std::string& name) {
-  useSingleThreadedBlas();
   if (name == "active_search") return std::make_unique<ActiveSearchMatcher>();
   if (name == "jcbb") return std::make_unique<JcbbMatcher>();
   if (name == "one_point_ransac") return std::make_unique<OnePointRansacMatcher>();

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "slot.h"
+#include "active_matching_slam/math/slot.h"
 
 namespace active_matching_slam {
 namespace {

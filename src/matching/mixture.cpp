@@ -5,8 +5,8 @@
 
 #include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/search_ellipse.h"
+#include "active_matching_slam/math/slot.h"
 #include "gaussian_mass.h"
-#include "slot.h"
 
 namespace active_matching_slam {
 namespace {

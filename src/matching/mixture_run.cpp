@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "active_matching_slam/matching/search_ellipse.h"
-#include "slot.h"
+#include "active_matching_slam/math/slot.h"
 
 namespace active_matching_slam {
 namespace {

@@ -4,9 +4,9 @@
 #include <limits>
 
 #include "active_matching_slam/matching/search_ellipse.h"
+#include "active_matching_slam/math/slot.h"
 #include "gaussian_mass.h"
 #include "mixture.h"
-#include "slot.h"
 
 namespace active_matching_slam {
 namespace {

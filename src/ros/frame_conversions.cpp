@@ -12,15 +12,6 @@
 namespace active_matching_slam {
 namespace {
 
-double finiteOrZero(double value) { return std::isfinite(value) ? value : 0.0; }
-
-template <typename Matrix, typename Array>
-void fillRowMajor(const Matrix& matrix, Array* array) {
-  for (int row = 0; row < matrix.rows(); ++row)
-    for (int col = 0; col < matrix.cols(); ++col)
-      (*array)[row * matrix.cols() + col] = finiteOrZero(matrix(row, col));
-}
-
 ams_msgs::Feature toFeatureMsg(const TrackedFeature& feature, double information_bits, int submap) {
   ams_msgs::Feature message;
   message.id = feature.id;

@@ -3,8 +3,8 @@
 #include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>
 
-#include "active_matching_slam/ros/debug_image.h"
 #include "active_matching_slam/ros/frame_conversions.h"
+#include "active_matching_slam/visualisation/debug_image.h"
 
 namespace active_matching_slam {
 namespace {

@@ -6,10 +6,12 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 #include <unordered_map>
+#include <utility>
 
+#include "active_matching_slam/math/quantile.h"
 #include "active_matching_slam/ros/frame_conversions.h"
-#include "active_matching_slam/ros/link_view.h"
 #include "active_matching_slam/ros/pose_conversions.h"
+#include "active_matching_slam/visualisation/link_view.h"
 
 namespace active_matching_slam {
 namespace {
@@ -113,9 +115,7 @@ double sceneSize(const TrackedFrame& frame) {
   }
   if (!in_view.empty()) distances = std::move(in_view);
   if (distances.empty()) return 1.0;
-  const auto middle = distances.begin() + distances.size() / 2;
-  std::nth_element(distances.begin(), middle, distances.end());
-  return std::clamp(*middle, 0.05, 100.0);
+  return std::clamp(medianOf(std::move(distances)), 0.05, 100.0);
 }
 
 std::unordered_map<std::int64_t, std::size_t> indexById(const TrackedFrame& frame) {

@@ -1,21 +1,8 @@
 #include "active_matching_slam/ros/pose_conversions.h"
 
+#include "active_matching_slam/math/rotation.h"
+
 namespace active_matching_slam {
-namespace {
-
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
-template <typename Array>
-void fillRowMajor(const Matrix6d& matrix, Array* array) {
-  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(array->data()) = matrix;
-}
-
-}  // namespace
-
 geometry_msgs::Point toPointMsg(const Eigen::Vector3d& point) {
   geometry_msgs::Point message;
   message.x = point.x();

@@ -4,7 +4,7 @@
 #include <iostream>
 #include <string>
 
-#include "active_matching_slam/matching/golden_vectors.h"
+#include "active_matching_slam/evaluation/golden_vectors.h"
 #include "common/tool_main.h"
 
 namespace {

@@ -1,7 +1,7 @@
 // Is the weight of the accepted hypothesis a probability? Thousands of simulated frames, hard ones
 // among them: a table, reliability.csv and reliability.png.
 
-#include "active_matching_slam/matching/reliability.h"
+#include "active_matching_slam/evaluation/reliability.h"
 
 #include <algorithm>
 #include <boost/program_options.hpp>

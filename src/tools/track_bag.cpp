@@ -16,8 +16,8 @@
 
 #include "active_matching_slam/evaluation/run_report.h"
 #include "active_matching_slam/evaluation/run_sequence.h"
-#include "active_matching_slam/ros/debug_image.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "active_matching_slam/visualisation/debug_image.h"
 #include "camera_bag_writer.h"
 #include "common/bag_image_source.h"
 #include "common/progress_bar.h"

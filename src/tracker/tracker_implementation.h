@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "active_matching_slam/filter/match_noise.h"
-#include "active_matching_slam/filter/start_adjustment.h"
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/information/map_structure.h"
+#include "active_matching_slam/initialisation/start_adjustment.h"
 #include "active_matching_slam/map/feature_map.h"
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/matching/matcher.h"

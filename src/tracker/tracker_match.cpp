@@ -8,9 +8,9 @@
 #include "active_matching_slam/image/image_motion.h"
 #include "active_matching_slam/image/warp.h"
 #include "active_matching_slam/information/gaussian_information.h"
-#include "active_matching_slam/tracker/chance_check.h"
+#include "active_matching_slam/matching/false_alarm.h"
+#include "active_matching_slam/matching/innovation_gate.h"
 #include "active_matching_slam/tracker/image_motion_prior.h"
-#include "active_matching_slam/tracker/innovation_check.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {

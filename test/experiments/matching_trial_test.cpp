@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "active_matching_slam/matching/simulated_problem.h"
+#include "active_matching_slam/evaluation/simulated_problem.h"
 
 namespace active_matching_slam {
 namespace {

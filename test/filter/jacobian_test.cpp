@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "active_matching_slam/filter/measurement_model.h"
-#include "active_matching_slam/filter/rotation.h"
 #include "active_matching_slam/filter/state_error.h"
+#include "active_matching_slam/math/rotation.h"
 #include "filter/example_filter.h"
 
 namespace active_matching_slam {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "active_matching_slam/filter/ekf.h"
-#include "active_matching_slam/filter/start_adjustment.h"
+#include "active_matching_slam/initialisation/start_adjustment.h"
 #include "filter/example_filter.h"
 
 namespace active_matching_slam {

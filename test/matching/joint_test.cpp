@@ -6,9 +6,9 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "active_matching_slam/evaluation/simulated_problem.h"
 #include "active_matching_slam/information/chow_liu_tree.h"
 #include "active_matching_slam/information/gaussian_information.h"
-#include "active_matching_slam/matching/simulated_problem.h"
 
 namespace active_matching_slam {
 namespace {

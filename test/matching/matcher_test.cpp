@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "active_matching_slam/matching/simulated_problem.h"
+#include "active_matching_slam/evaluation/simulated_problem.h"
 
 namespace active_matching_slam {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "active_matching_slam/ros/frame_conversions.h"
-#include "active_matching_slam/ros/link_view.h"
 #include "active_matching_slam/ros/pose_conversions.h"
+#include "active_matching_slam/visualisation/link_view.h"
 #include "ros/point_feature.h"
 #include "ros/world_header.h"
 

@@ -9,10 +9,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
-#include "active_matching_slam/ros/debug_image.h"
 #include "active_matching_slam/ros/frame_conversions.h"
 #include "active_matching_slam/ros/markers.h"
 #include "active_matching_slam/ros/pose_conversions.h"
+#include "active_matching_slam/visualisation/debug_image.h"
 #include "ros/finite_check.h"
 #include "support/fuzz.h"
 #include "tracker/simulated_frames.h"

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
+#include <algorithm>
+
+#include "active_matching_slam/math/feature_id.h"
 
 namespace active_matching_slam {
-
-using FeatureId = std::int64_t;
 
 enum class FeatureKind { kInverseDepth, kPoint };
 
@@ -49,5 +49,18 @@ struct FeatureState {
                : Eigen::Vector3d(anchor_world + bearing_world / inverse_depth);
   }
 };
+
+/// Homogeneous world point (X, w), w >= 0: position X / w, at infinity for w = 0.
+/// For inverse depth (rho * anchor + m, rho), which stays finite as rho -> 0.
+inline Eigen::Vector4d homogeneousPosition(const FeatureState& feature) {
+  Eigen::Vector4d point;
+  if (feature.kind == FeatureKind::kPoint) {
+    point << feature.point_world, 1.0;
+  } else {
+    const double rho = std::max(feature.inverse_depth, 0.0);
+    point << rho * feature.anchor_world + feature.bearing_world, rho;
+  }
+  return point;
+}
 
 }  // namespace active_matching_slam

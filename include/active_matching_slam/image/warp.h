@@ -30,10 +30,6 @@ struct PatchView {
   double view_angle_rad = 0.0;  ///< between the rays from first camera and present camera to it
 };
 
-/// Homogeneous world point (X, w), w >= 0: position X / w, at infinity for w = 0.
-/// For inverse depth (rho * anchor + m, rho), which stays finite as rho -> 0.
-Eigen::Vector4d homogeneousPosition(const FeatureState& feature);
-
 /// View of a locally planar patch of the slope known: the homography R - t n^T / d between bearings
 /// and both lens mappings, to second order about the centre. Works for points at infinity (rotation
 /// only). Empty when the point is behind a camera, at a camera's centre, outside the lens model, or

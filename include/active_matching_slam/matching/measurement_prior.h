@@ -4,10 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace active_matching_slam {
+#include "active_matching_slam/math/feature_id.h"
 
-/// Identifies a map feature for as long as the map lives; never reused.
-using FeatureId = std::int64_t;
+namespace active_matching_slam {
 
 /// How often a feature's search tells the truth (Chli 2009, section 5.3.3).
 struct FeatureRates {

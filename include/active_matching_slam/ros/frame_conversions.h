@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "active_matching_slam/ros/messages.h"
-#include "active_matching_slam/ros/submap_view.h"
 #include "active_matching_slam/tracker/tracked_frame.h"
+#include "active_matching_slam/visualisation/submap_view.h"
 
 namespace active_matching_slam {
 

@@ -7,6 +7,7 @@
 #include <std_msgs/Header.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <string>
 
 #include "active_matching_slam/filter/camera_state.h"
@@ -14,6 +15,16 @@
 namespace active_matching_slam {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+inline double finiteOrZero(double value) { return std::isfinite(value) ? value : 0.0; }
+
+/// Into the array of a message, row by row; what is not finite becomes zero.
+template <typename Matrix, typename Array>
+void fillRowMajor(const Matrix& matrix, Array* array) {
+  for (int row = 0; row < matrix.rows(); ++row)
+    for (int col = 0; col < matrix.cols(); ++col)
+      (*array)[row * matrix.cols() + col] = finiteOrZero(matrix(row, col));
+}
 
 geometry_msgs::Point toPointMsg(const Eigen::Vector3d& point);
 geometry_msgs::Vector3 toVectorMsg(const Eigen::Vector3d& vector);

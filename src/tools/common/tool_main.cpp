@@ -3,9 +3,12 @@
 #include <exception>
 #include <iostream>
 
+#include "active_matching_slam/math/blas_threads.h"
+
 namespace active_matching_slam {
 
 int runTool(const std::string& name, const std::function<int()>& run) {
+  useSingleThreadedBlas();
   try {
     return run();
   } catch (const std::exception& error) {
