@@ -26,6 +26,8 @@ endforeach()
 
 add_test(NAME ${PROJECT_NAME}_house
   COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/include_graph_test.py)
+add_test(NAME ${PROJECT_NAME}_words
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/words_test.py)
 
 get_property(tests DIRECTORY PROPERTY TESTS)
 foreach(test ${tests})

@@ -32,9 +32,9 @@ std::optional<double> normalisedErrorSquared(const Eigen::VectorXd& error,
   return result;
 }
 
-std::optional<double> likeliestUnit(const std::vector<Eigen::Isometry3d>& estimates,
-                                    const std::vector<Eigen::Isometry3d>& truth,
-                                    const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
+std::optional<double> likeliestScale(const std::vector<Eigen::Isometry3d>& estimates,
+                                     const std::vector<Eigen::Isometry3d>& truth,
+                                     const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
   // The error is d + u t, where d is that to a truth at the origin and t the true translation.
   double information = 0.0, weighted = 0.0;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
@@ -50,9 +50,9 @@ std::optional<double> likeliestUnit(const std::vector<Eigen::Isometry3d>& estima
     information += t.dot(Wt);
     weighted -= d.dot(Wt);
   }
-  const double unit = weighted / information;
-  if (!(information > 0.0) || !(unit > 0.0)) return std::nullopt;
-  return unit;
+  const double scale = weighted / information;
+  if (!(information > 0.0) || !(scale > 0.0)) return std::nullopt;
+  return scale;
 }
 
 ChiSquareBounds chiSquareMeanBounds(int degrees, int runs, double confidence) {
@@ -85,7 +85,7 @@ std::vector<double> meanOverRuns(const std::vector<std::vector<double>>& values_
   return mean;
 }
 
-double shareWithin(const std::vector<double>& values, const ChiSquareBounds& bounds) {
+double fractionWithin(const std::vector<double>& values, const ChiSquareBounds& bounds) {
   int within = 0, count = 0;
   for (double value : values) {
     if (!std::isfinite(value)) continue;

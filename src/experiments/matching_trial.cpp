@@ -28,7 +28,7 @@ MatchOptions thesisOptions() {
 
 MatchOptions packageOptions() {
   MatchOptions options = liveMatchOptions();
-  options.ambiguous_below_weight = 0.0;  // judged like the others, on what they take for best
+  options.ambiguous_below_weight = 0.0;  // as the others, scored on their best hypothesis
   options.clock_s = threadSeconds;
   return options;
 }

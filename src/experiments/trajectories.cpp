@@ -98,7 +98,7 @@ ExperimentResult runTrajectories(Workbench& bench) {
       const auto add = [&](std::size_t m, const char* thesis, bool agrees) {
         result.findings.push_back({text("%s, %d features, %s, %.4g Hz", matchers[m].c_str(),
                                         counts.back(), name.c_str(), 30.0 / every),
-                                   thesis, resultText(with_most[m]), judge(agrees)});
+                                   thesis, resultText(with_most[m]), verdict(agrees)});
       };
       add(0, is_walkway ? "kept, straight" : "the model trajectory",
           with_most[0].tracked == with_most[0].frames && with_most[0].ate_percent < 10.0);

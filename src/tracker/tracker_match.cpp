@@ -121,7 +121,7 @@ bool Tracker::Implementation::askToo(Matcher& matcher, const MeasurementPrior& p
   const std::int64_t pixels_before = frame->matching.statistics.pixels_searched;
   const double total_before_ms = frame->matching.statistics.total_ms;
   const double budget_before_ms = frame->matching.statistics.budget_ms;
-  const double left = 1.0 - shareOfBudget(partOfBudget(1.0), pixels_before, budget_before_ms);
+  const double left = 1.0 - fractionOfBudget(partOfBudget(1.0), pixels_before, budget_before_ms);
   if (!(left > 0.0)) return false;
   MatchResult second = matcher.match(prior, search, partOfBudget(share * left));
   second.statistics.pixels_searched += pixels_before;
@@ -294,7 +294,7 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
   const Eigen::MatrixXd S = selectFeatures(prior_.S, matched);
   std::vector<FeatureMeasurement> fused;
   std::vector<double> seen_px;
-  for (int k : agreeingMeasurements(innovation, S, kAgreementChi2)) {
+  for (int k : leaveOneOutInliers(innovation, S, kAgreementChi2)) {
     const FeatureId id = prior_.ids[matched[k]];
     const SearchMatch& match = matchOf(matched[k]);
     fused.push_back({id, match.pixel, match.sigma_px, 1.0, match.noise_shape});

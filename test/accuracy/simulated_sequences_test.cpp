@@ -96,7 +96,7 @@ TEST_P(SimulatedSequences, AreTrackedToTheEndWithinOnePercentOfThePath) {
       "room %s seed %d: %d of %d frames tracked, error %.2f mm = %.3f %% of %.2f m; pose NEES "
       "(6 degrees) mean %.1f median %.1f, %.0f %% within 95 %% bounds\n",
       motion, seed, summary.frames_tracked, summary.frames, 1e3 * error, 100.0 * error / path, path,
-      mean, nees[nees.size() / 2], 100.0 * shareWithin(nees, chiSquareMeanBounds(6, 1)));
+      mean, nees[nees.size() / 2], 100.0 * fractionWithin(nees, chiSquareMeanBounds(6, 1)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Room, SimulatedSequences,

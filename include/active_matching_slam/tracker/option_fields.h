@@ -149,28 +149,29 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matching.update_rule);
   visit(F{"matching/prune_weight", "Gaussians below this weight are dropped", true},
         o.matching.prune_weight, 0.0, 0.5);
-  visit(F{"matching/recount", "judge all hypotheses anew at the end, dropped ones too", true},
-        o.matching.recount);
-  visit(F{"matching/hearing_weight",
-          "a Gaussian that has weighed this is not dropped before it has been searched itself; 0: "
-          "never",
+  visit(F{"matching/joint_rescoring",
+          "re-score all hypotheses by their joint evidence at the end, pruned ones too", true},
+        o.matching.joint_rescoring);
+  visit(F{"matching/deferred_pruning_weight",
+          "a Gaussian that once had this weight is not pruned before it was searched itself; 0: it "
+          "is",
           true},
-        o.matching.hearing_weight, 0.0, 1.0);
-  visit(F{"matching/runners_up",
-          "hypotheses that were likely once, and are searched to their end when the accepted one "
-          "misses too much; needs recount",
+        o.matching.deferred_pruning_weight, 0.0, 1.0);
+  visit(F{"matching/k_best",
+          "alternatives searched to completion when the accepted hypothesis has too many missed "
+          "detections; needs joint_rescoring",
           true},
-        o.matching.runners_up, 0, 100);
+        o.matching.k_best, 0, 100);
   visit(F{"matching/max_gaussians", "cap on the mixture; 0: none", true}, o.matching.max_gaussians,
         0, 100000);
-  visit(
-      F{"matching/merge_sigmas",
-        "Gaussians that differ in one match only, and in what they expect by less [sigma], become "
-        "one; 0: never",
-        true},
-      o.matching.merge_sigmas, 0.0, 10.0);
-  visit(F{"matching/merge_share", "probability at which one of such matches is accepted", true},
-        o.matching.merge_share, 0.0, 1.0);
+  visit(F{"matching/merge_sigmas",
+          "Gaussians that differ in one match, and in their predictions by less than this, merge "
+          "[sigma]; 0: never",
+          true},
+        o.matching.merge_sigmas, 0.0, 10.0);
+  visit(F{"matching/merge_probability",
+          "least probability, among merged matches, of one that is accepted", true},
+        o.matching.merge_probability, 0.0, 1.0);
   visit(F{"matching/latch_information_bits",
           "below, no more mutual information is computed [bit]; "
           "0: never",
