@@ -21,7 +21,6 @@ MatchOptions thesisOptions() {
   options.update_rule = UpdateRule::kThesis;
   options.max_gaussians = 25;
   options.default_rates.true_positive = 0.8;
-  options.use_feature_rates = false;
   options.clock_s = threadSeconds;
   return options;
 }

@@ -29,14 +29,18 @@ Eigen::Vector2d medianInnovation(const std::vector<SearchRecord>& searches) {
   return {medianOf(std::move(x)), medianOf(std::move(y))};
 }
 
-}  // namespace
-
-const MapFeature* FeatureMap::find(FeatureId id) const {
-  const auto it = std::lower_bound(features_.begin(), features_.end(), id, byId);
-  return it != features_.end() && it->id == id ? &*it : nullptr;
+/// The feature among some in the order of their ids, constant or not; null when unknown.
+template <class Features>
+auto findIn(Features& features, FeatureId id) -> decltype(features.data()) {
+  const auto it = std::lower_bound(features.begin(), features.end(), id, byId);
+  return it != features.end() && it->id == id ? &*it : nullptr;
 }
 
-MapFeature* FeatureMap::findMutable(FeatureId id) { return const_cast<MapFeature*>(find(id)); }
+}  // namespace
+
+const MapFeature* FeatureMap::find(FeatureId id) const { return findIn(features_, id); }
+
+MapFeature* FeatureMap::findMutable(FeatureId id) { return findIn(features_, id); }
 
 void FeatureMap::clear() { features_.clear(); }
 

@@ -52,7 +52,6 @@ void checkMatchOptions(const MatchOptions& o) {
           o.fast_accept_weight, "[0, 1]");
   require(o.max_pixels >= 0, "max_pixels", static_cast<double>(o.max_pixels), "[0, inf)");
   require(o.max_milliseconds >= 0.0, "max_milliseconds", o.max_milliseconds, "[0, inf)");
-  require(o.auto_milliseconds > 0.0, "auto_milliseconds", o.auto_milliseconds, "(0, inf)");
   require(o.jcbb_max_nodes >= 0, "jcbb_max_nodes", static_cast<double>(o.jcbb_max_nodes),
           "[0, inf)");
   require(isProbability(o.jcbb_confidence), "jcbb_confidence", o.jcbb_confidence, "(0, 1)");

@@ -16,9 +16,8 @@ std::vector<SearchLikelihood> likelihoodsOf(const MeasurementPrior& given, const
                                             const MatchOptions& options) {
   std::vector<SearchLikelihood> likelihoods;
   for (int f = 0; f < prior.size(); ++f)
-    likelihoods.emplace_back(given.rates.empty() || !options.use_feature_rates
-                                 ? options.default_rates
-                                 : given.rates[slot(prior.original(f))]);
+    likelihoods.emplace_back(given.rates.empty() ? options.default_rates
+                                                 : given.rates[slot(prior.original(f))]);
   return likelihoods;
 }
 

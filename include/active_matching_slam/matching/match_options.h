@@ -15,8 +15,7 @@ enum class UpdateRule {
 
 /// Settings of the matchers. Each states which matchers read it.
 struct MatchOptions {
-  FeatureRates default_rates;     ///< mixture matchers: for features without rates of their own
-  bool use_feature_rates = true;  ///< false: the default rates for all
+  FeatureRates default_rates;  ///< mixture matchers: for a prior without rates
 
   // Mixture of Gaussians: active, fast_active, chow_liu.
   UpdateRule update_rule = UpdateRule::kIncremental;
@@ -42,8 +41,8 @@ struct MatchOptions {
   /// and similarity, is at least this; else the feature is left unmatched.
   double merge_probability = 0.9;
   double latch_information_bits = 0.0;  ///< stop rule (a): below, no more MI is computed; 0: never
-  /// Stop rule: done when the heaviest Gaussian weighs at least this and has no feature left to
-  /// search; 0: never, the search goes on until no Gaussian has a candidate.
+  /// Stop rule of the reference traces (golden vectors, am_finish): done when the heaviest Gaussian
+  /// weighs at least this and has no feature left to search; 0: never.
   double finish_weight = 0.0;
   double ambiguous_below_weight = 0.0;  ///< a result of less weight is marked ambiguous; 0: never
   int fast_candidates = 15;             ///< fast_active: candidates evaluated a step
@@ -57,10 +56,6 @@ struct MatchOptions {
   /// The budget's milliseconds come from a model of the work done and not from the clock: the same
   /// result on every machine, every time.
   bool modelled_time = false;
-  /// auto: active is taken while its modelled cost is below this (and below max_milliseconds, if
-  /// set), and beyond if chow_liu would not halve it, as with less than about 130 features. The
-  /// model counts features and expected matches; no clock decides.
-  double auto_milliseconds = 10.0;
   /// Monotonic clock of the budget, unless that is modelled, and of the reported durations, in
   /// seconds; empty: steady_clock.
   std::function<double()> clock_s;

@@ -7,14 +7,6 @@
 
 namespace active_matching_slam {
 
-/// The tracker's settings in a node, which must keep up with the camera: the core's, and a bound on
-/// the time that matching a frame may take.
-inline TrackerOptions liveTrackerOptions() {
-  TrackerOptions options;
-  options.matching.max_milliseconds = 20.0;
-  return options;
-}
-
 /// Settings of the ROS side; those of the tracker itself are TrackerOptions.
 struct NodeOptions {
   std::string image_transport = "raw";
