@@ -2,11 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
+
+#include "active_matching_slam/math/chi_square.h"
 
 namespace active_matching_slam {
 
@@ -62,10 +63,10 @@ ChiSquareBounds chiSquareMeanBounds(int degrees, int runs, double confidence) {
   if (!(confidence > 0.0 && confidence < 1.0))
     throw std::invalid_argument("chi-square bounds: confidence is " + std::to_string(confidence) +
                                 ", must lie in (0, 1)");
-  const boost::math::chi_squared sum(static_cast<double>(degrees) * runs);
   const double tail = 0.5 * (1.0 - confidence);
-  return {boost::math::quantile(sum, tail) / runs,
-          boost::math::quantile(boost::math::complement(sum, tail)) / runs};
+  const double sum_degrees = static_cast<double>(degrees) * runs;
+  return {chiSquareQuantile(sum_degrees, tail) / runs,
+          chiSquareQuantile(sum_degrees, 1.0 - tail) / runs};
 }
 
 std::vector<double> meanOverRuns(const std::vector<std::vector<double>>& values_of_run) {

@@ -1,7 +1,6 @@
 #include "active_matching_slam/evaluation/trajectory_error.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
 

@@ -20,7 +20,7 @@ class BranchAndBound {
                  const std::vector<std::vector<int>>& gates, const MatchOptions& options)
       : prior_(prior), search_(budgeted), gates_(gates), options_(options), size_(prior.size()) {
     for (int n = 1; n <= size_; ++n)
-      limits_.push_back(chiSquareQuantile(n, options.jcbb_confidence));
+      limits_.push_back(chiSquareQuantile(2 * n, options.jcbb_confidence));
     open_gates_.assign(static_cast<std::size_t>(size_) + 1, 0);
     for (int f = size_ - 1; f >= 0; --f)
       open_gates_[slot(f)] = open_gates_[slot(f + 1)] + !gates[slot(f)].empty();
