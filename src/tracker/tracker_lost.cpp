@@ -13,8 +13,8 @@ constexpr double kFoundSigmaRotation = 0.1;  ///< [rad]
 }  // namespace
 
 /// Decides whether the camera is still tracked.
-void Tracker::Implementation::judge() {
-  const int matched = static_cast<int>(fused_.size());
+void Tracker::Implementation::updateTrackingState(const FrameState& current) {
+  const int matched = static_cast<int>(current.measurements.size());
   if (matched >= options_.minimum_matches) {
     poor_frames_ = 0;
     state_ = TrackingState::kTracking;
@@ -23,8 +23,8 @@ void Tracker::Implementation::judge() {
   }
   ++poor_frames_;
   std::ostringstream reason;
-  reason << matched << " of " << prior_.size() << " features matched, " << options_.minimum_matches
-         << " are needed";
+  reason << matched << " of " << current.prior.size() << " features matched, "
+         << options_.minimum_matches << " are needed";
   reason_ = reason.str();
   if (poor_frames_ >= options_.lost_after_frames && state_ != TrackingState::kLost) {
     lose(reason_);
@@ -46,7 +46,7 @@ void Tracker::Implementation::lose(const std::string& reason) {
 }
 
 /// What becomes of an image while the camera is lost.
-void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
+void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame) {
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
   // Lost soon after the start: nothing is known but directions.
   if (!relocaliser_.canFind(filter_, map_)) {
@@ -59,12 +59,12 @@ void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* fra
     reset(reason.str());
     return;
   }
-  if (frame->index % kFramesBetweenLooks == 0) findInMap(image, frame);
+  if (frame->index % kRelocalisationPeriodFrames == 0) relocalise(image, frame);
 }
 
-/// Looks for the camera in the whole map by one whole image. False when it is not found; the state
-/// is then as before.
-bool Tracker::Implementation::findInMap(const cv::Mat& image, TrackedFrame* frame) {
+/// Searches the whole image for the whole map. False when the camera is not found; the state is
+/// then as before.
+bool Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
   const auto found = relocaliser_.find(camera_, image, filter_, map_);
   if (!found) return false;
   CameraState camera;

@@ -33,11 +33,10 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
     filter_.reset(CameraState(), sigma.array().square().matrix().asDiagonal());
     scale_source_ = ScaleSource::kFree;
   }
-  visible_.clear();
-  // Pose and covariance are told with respect to this image: it gives all the corners that it has,
-  // of which each look at it finds one a cell.
+  // Pose and covariance are relative to this image: it gives all the corners that it has, of which
+  // each detection finds one a cell.
   for (int started = 1; started > 0; frame->features_started += started)
-    started = startFeatures(image, options_.map.features_per_frame - map_.size(), frame);
+    started = startFeatures(image, {}, options_.map.features_per_frame - map_.size(), frame);
   start_adjustment_.end();
   if (options_.known_points.empty()) {
     filter_.fixScale(Ekf::kFreeScaleSigma);
@@ -58,8 +57,9 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
 }
 
 /// Lets the first images, taken together, correct what the filter made of them one by one.
-void Tracker::Implementation::adjustStart(TrackedFrame* frame) {
-  start_adjustment_.add(frame->index, interval_s_, filter_, fused_);
+void Tracker::Implementation::adjustStart(const FrameState& current, TrackedFrame* frame) {
+  if (!start_adjustment_.isActive()) return;
+  start_adjustment_.add(frame->index, current.interval_s, filter_, current.measurements);
   const auto adjusted = start_adjustment_.adjust(camera_.corrected({}), filter_);
   if (!adjusted) return;
   std::vector<FeatureId> dropped;  // seen too rarely to take part
