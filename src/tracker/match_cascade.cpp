@@ -83,7 +83,7 @@ void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* 
   if (expectedMatches(*frame) < options_.minimum_expected) return;
   if (!is_wide && isPoor(*frame)) retryGuided(matching, frame);
   if (frame->poor_frames <= options_.maximum_poor_frames)
-    askConsensusMatchers(matching, prior, frame);
+    tryConsensusMatchers(matching, prior, frame);
   if (!isFalseAlarm(*frame)) return;
   MatchResult& result = frame->matching;
   std::fill(result.match_of_feature.begin(), result.match_of_feature.end(), -1);
@@ -103,8 +103,8 @@ void MatchCascade::retryGuided(const MatchOptions& matching, FrameState* frame) 
     frame->search = std::move(search);
 }
 
-/// Both look where the gates are, so what has been searched there need not be again.
-void MatchCascade::askConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
+/// Both search the gates of `prior`: what has been searched there need not be again.
+void MatchCascade::tryConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
                                         FrameState* frame) {
   const double expected = expectedMatches(*frame);
   const auto matched = [frame] { return double(frame->matching.statistics.matched); };

@@ -103,7 +103,7 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   frame->timings_ms.measure = stage.lap();
   if (options_.structure) observeStructure(current.visible);
   frame->timings_ms.structure = stage.lap();
-  cascade_.match(options_.matching, options_.second_opinion, &current);
+  cascade_.match(options_.matching, options_.fallback_matchers, &current);
   frame->timings_ms.match = stage.lap();
   correct(&current, frame);
   adjustStart(current, frame);

@@ -21,8 +21,8 @@ struct MatchCascadeOptions {
   double majority_fraction = 0.5;
   /// Expected matches below which nothing is tried: a fraction of so few is mostly rounding.
   double minimum_expected = 8.0;
-  /// Ratio to the matches so far that the guided retry and RANSAC must reach: an equal number would
-  /// not say which of the two is right.
+  /// Ratio to the matches so far that the guided retry and RANSAC must reach: with about as many,
+  /// either may be the wrong one.
   double replacing_ratio = 1.25;
   /// Fraction of the expected matches below which RANSAC's consensus, and any result while depths
   /// are vague, is taken for chance.
@@ -75,7 +75,7 @@ struct MatchCascadeOptions {
 ///
 /// Guided prior: given how the image as a whole moved since the reference image, for a camera that
 /// was jerked. JCBB: where structure repeats in wide gates, sequential matchers can lose the true
-/// hypothesis among many equals; it looks for the longest one. RANSAC: a sequential matcher that
+/// hypothesis among many equals; it finds the longest one. RANSAC: a sequential matcher that
 /// follows something that moves by itself first can end up with that and little else. A-contrario:
 /// in a blurred image a few matches agree by chance; none lets the camera wait for the next image.
 /// All between the first and the last only with the fallbacks and with at least 8 expected matches.
@@ -96,7 +96,7 @@ class MatchCascade {
 
   void matchWithFallbacks(const MatchOptions& matching, FrameState* frame);
   void retryGuided(const MatchOptions& matching, FrameState* frame);
-  void askConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
+  void tryConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
                             FrameState* frame);
   bool tryFallback(const Fallback& fallback, const MatchOptions& matching, FrameState* frame) const;
   MatchOptions withBudget(const MatchOptions& matching, double fraction,
