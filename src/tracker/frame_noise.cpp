@@ -22,15 +22,15 @@ constexpr double kSigmaWhileAdjusted = 1.27;
 
 }  // namespace
 
-std::vector<double> FrameNoise::relativeProcessNoise(const Ekf& filter,
-                                                     const FeatureMap& map) const {
-  std::vector<double> relative;
-  for (const FeatureState& state : filter.features()) {
+void FrameNoise::addProcessNoise(const CameraModel& camera, double interval_s,
+                                 const FeatureMap& map, Ekf* filter) const {
+  std::vector<double> relative;  // to the median landmark's
+  for (const FeatureState& state : filter->features()) {
     const MapFeature& feature = *map.find(state.id);
     // Known points hold the scale: no more of that is given up than for others.
     relative.push_back(feature.known ? 1.0 : match_noise_.wanderLikeMost(feature.noise));
   }
-  return relative;
+  filter->letCornersWander(camera, interval_s, relative);
 }
 
 void FrameNoise::weigh(const FilterOptions& options,

@@ -15,9 +15,13 @@ class FrameNoise {
  public:
   void reset() { *this = FrameNoise(); }
 
-  /// Process noise of each of the filter's features relative to the median, for
-  /// Ekf::letCornersWander().
-  std::vector<double> relativeProcessNoise(const Ekf& filter, const FeatureMap& map) const;
+  /// Adds the landmarks' process noise of `interval_s`. After Ekf::predict().
+  void addProcessNoise(const CameraModel& camera, double interval_s, const FeatureMap& map,
+                       Ekf* filter) const;
+
+  /// Standard deviation per axis [px] that gates and matchers allow a match: an upper bound, since
+  /// that is before anything is known of the image.
+  static double gateSigma_px(const FilterOptions& options) { return options.sigma_px; }
 
   /// Sets the noise of the measurements of one image, ascending by id. They come with the sigma of
   /// their template's fit (SearchMatch::sigma_px). `is_adjusted`: whether the initialiser will use
@@ -29,8 +33,10 @@ class FrameNoise {
   void learn(const UpdateReport& report, const std::vector<FeatureMeasurement>& measurements,
              FeatureMap* map);
 
-  /// Standard deviation of most matches per axis [px].
-  double sigma_px(const FilterOptions& options) const { return match_noise_.sigma_px(options); }
+  /// Median standard deviation of matches in the present image, per axis [px].
+  double typicalSigma_px(const FilterOptions& options) const {
+    return match_noise_.sigma_px(options);
+  }
 
  private:
   MatchNoise match_noise_;

@@ -133,7 +133,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
     MapFeature feature;
     feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
                                                 relative_sigma * inverse_depth,
-                                                noise_.sigma_px(options_.filter));
+                                                noise_.typicalSigma_px(options_.filter));
     if (feature.id < 0) continue;
     first_sights.push_back({feature.id, corner.pixel, 0.0});
     feature.patch = std::move(*patch);

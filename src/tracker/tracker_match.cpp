@@ -22,7 +22,7 @@ void Tracker::Implementation::predict(double interval_s) {
   }
   interval_s = std::min(interval_s, options_.max_frame_interval_s);
   filter_.predict(interval_s);
-  filter_.letCornersWander(camera_, interval_s, noise_.relativeProcessNoise(filter_, map_));
+  noise_.addProcessNoise(camera_, interval_s, map_, &filter_);
 }
 
 /// Features that should be seen and the templates to search them by.
@@ -52,7 +52,8 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   prior.ids = std::move(predicted.ids);
   prior.z = std::move(predicted.z);
   prior.S = std::move(predicted.S);
-  prior.noise_variance_px2 = options_.filter.sigma_px * options_.filter.sigma_px;
+  const double sigma_px = FrameNoise::gateSigma_px(options_.filter);
+  prior.noise_variance_px2 = sigma_px * sigma_px;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {
     if (ids[i] != prior.ids[kept]) continue;
@@ -94,7 +95,7 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   noise_.weigh(
       options_.filter, [this](FeatureId id) { return start_adjustment_.adjusts(id); }, &map_,
       &current->measurements);
-  frame->match_sigma_px = noise_.sigma_px(options_.filter);
+  frame->match_sigma_px = noise_.typicalSigma_px(options_.filter);
 
   const UpdateReport report = filter_.update(camera_, current->measurements);
   frame->nis = report.nis;
