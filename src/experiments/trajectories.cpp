@@ -21,7 +21,7 @@ TrackedRun runMatcher(const Sequence& sequence, const std::string& matcher, int 
   options.matcher = matcher;
   options.matching = matcherVariant(matcher).options;
   // The matcher alone decides, with the same rates for all features (section 7.5.2).
-  options.second_opinion = false;
+  options.fallback_matchers = false;
   options.learn_rates = false;
   TrackedRun run;
   trackSequence(sequence, options, every, [&](const TrackedFrame& frame, int) {

@@ -169,7 +169,7 @@ TEST_F(RecordedSequences, ActiveMatchingKeepsTheCheckerboardAtSevenAndAHalfHertz
 
 TEST_F(RecordedSequences, PlainActiveSearchLosesItsWayOnTheCheckerboardAtSevenAndAHalfHertz) {
   TrackerOptions options = withMatcher("active_search");
-  options.second_opinion = false;
+  options.fallback_matchers = false;
   const TrackedRun run = trackAll("uzh_vamr_checkerboard", 4, options, false);
   const bool is_kept = static_cast<int>(run.tracked.size()) == run.frames;
   EXPECT_TRUE(!is_kept || errorMm(run, "uzh_vamr_checkerboard", AlignmentKind::kSimilarity) > 6.0);

@@ -17,7 +17,7 @@ struct BoardRun {
   double error_of_path = 0.0;  ///< absolute trajectory error over the length of the path
 };
 
-BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool second_opinion) {
+BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool fallback_matchers) {
   SimulatorOptions simulation;
   simulation.scene = "checkerboard";
   simulation.width = 320;
@@ -27,7 +27,7 @@ BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool seco
   Simulator simulator(simulation);
   TrackerOptions options;
   options.matcher = matcher;
-  options.second_opinion = second_opinion;
+  options.fallback_matchers = fallback_matchers;
   Tracker tracker(simulator.camera(), options);
   Trajectory tracked, truth;
   BoardRun run;
@@ -44,7 +44,7 @@ BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool seco
   const double path = measureExcursion(truth).path_length;
   run.error_of_path = alignment ? absoluteTrajectoryError(pairs, *alignment) / path : 1.0;
   std::printf("%s at %g Hz%s: %d of %d frames, error %.2f %% of the path\n", matcher.c_str(),
-              rate_hz, second_opinion ? ", with second opinions" : "", run.tracked, run.frames,
+              rate_hz, fallback_matchers ? ", with fallback matchers" : "", run.tracked, run.frames,
               100.0 * run.error_of_path);
   return run;
 }

@@ -25,11 +25,11 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matcher);
   visit(F{"learn_rates", "learn how often each feature is matched rightly and wrongly", true},
         o.learn_rates);
-  visit(F{"second_opinion",
+  visit(F{"fallback_matchers",
           "when far fewer match than should, match again by the motion of the whole image, jcbb, "
           "one_point_ransac",
           true},
-        o.second_opinion);
+        o.fallback_matchers);
   visit(F{"structure", "maintain the graph of mutual information and the submaps", true},
         o.structure);
   visit(
@@ -42,6 +42,9 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.structure_accelerations.angular_rps2, 0.0, 1e3);
   visit(F{"known_points_search_px", "how far a known point may lie from its image_px [px]", false},
         o.known_points_search_px, 1.0, 200.0);
+  visit(F{"known_points_sigma_m",
+          "accuracy of the known points' positions, standard deviation per axis [m]", false},
+        o.known_points_sigma_m, 1e-6, 1.0);
   visit(F{"max_frame_interval_s",
           "after a longer gap between stamps the whole image is searched for the map first [s]",
           true},
