@@ -50,10 +50,10 @@ class Run:
         error_m = np.linalg.norm(true[:, :3] - (scale * pose[:, :3] @ R.T + t), axis=1)
         sigma_m = scale * np.sqrt(np.trace(covariance[:, :3, :3], axis1=1, axis2=2))
         self.ate_m = float(np.sqrt(np.mean(error_m**2)))
-        path_m = np.sum(np.linalg.norm(np.diff(truth[:, 1:4], axis=0), axis=1))
-        self.ate_of_path = self.ate_m / path_m if path_m > 0 else None
         self.ratios = error_m[sigma_m > 0] / sigma_m[sigma_m > 0]
         if case.is_film:
+            path_m = np.sum(np.linalg.norm(np.diff(truth[:, 1:4], axis=0), axis=1))
+            self.ate_of_path = self.ate_m / path_m if path_m > 0 else None
             self.nees[self.tracked[mine]] = pose_nees(pose, covariance, true)
 
     def numbers(self):
