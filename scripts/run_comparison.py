@@ -126,27 +126,36 @@ def ratios_of(pairs, coarse=()):
             ratio(lambda run: quantile(run.ms, .5)), ratio(lambda run: quantile(run.ms, .99))]
 
 
+def rows_of(case, every):
+    """(name, frames of it or None for all) of the rows of the table that a case belongs to. The
+    last stands for it in the means."""
+    rows = [(case.row, None)]
+    if case.row in TRUE_UNTIL_FRAME:
+        until = TRUE_UNTIL_FRAME[case.row]
+        rows.append(('%s, frames 0 to %d' % (case.row, until - 1), -(-until // every)))
+    return rows
+
+
 def report(results, builds, every=1):
     """The whole page, as lines, and whether all went well. Results: (case, folder or Failure of
     OLD, the same of NEW), of every `every`-th image."""
     rows, counted, failures, untracked = {}, [], [], []
     for case, *outcomes in results:
-        failures += ['- FAILED: %s, %s: %s' % (case.name, build.folder, outcome)
-                     for build, outcome in zip(builds, outcomes) if isinstance(outcome, Failure)]
-        old, new = rows.setdefault(case.row, ([], []))
-        if any(isinstance(outcome, Failure) for outcome in outcomes):
-            continue
-        runs = [Run(folder, case) for folder in outcomes]
-        old.append(runs[0])
-        new.append(runs[1])
-        missing = len(set(runs[0].tracked) - set(runs[1].tracked))
-        if missing:
-            untracked.append('%s: %d' % (case.name, missing))
-        until = TRUE_UNTIL_FRAME.get(case.row)
-        if until:
-            runs = [Run(folder, case, -(-until // every)) for folder in outcomes]
-            rows[case.row + ', frames 0 to %d' % (until - 1)] = ([runs[0]], [runs[1]])
-        counted.append((case.row, case.is_film, runs[0], runs[1]))
+        failed = ['- FAILED: %s, %s: %s' % (case.name, build.folder, outcome)
+                  for build, outcome in zip(builds, outcomes) if isinstance(outcome, Failure)]
+        failures += failed
+        for name, frames in rows_of(case, every):
+            old, new = rows.setdefault(name, ([], []))
+            if failed:
+                continue
+            runs = [Run(folder, case, frames) for folder in outcomes]
+            old.append(runs[0])
+            new.append(runs[1])
+            if not frames:
+                missing = len(set(runs[0].tracked) - set(runs[1].tracked))
+                untracked += ['%s: %d' % (case.name, missing)] if missing else []
+        if not failed:
+            counted.append((case.row, case.is_film, *runs))
     lines = table([(name, old, new) for name, (old, new) in rows.items()])
     films = max((len(old) for name, (old, _) in rows.items() if name.startswith('film ')),
                 default=0)
@@ -165,16 +174,12 @@ def report(results, builds, every=1):
     return lines + ([''] + failures if failures else []), not failures
 
 
-def write_csv(path, results):
+def write_csv(path, results, every=1):
+    lines = [{'case': case.name, 'row': row, 'build': build, **Run(outcome, case, frames).numbers()}
+             for case, *outcomes in results for row, frames in rows_of(case, every)
+             for build, outcome in zip(('old', 'new'), outcomes)
+             if not isinstance(outcome, Failure)]
     with open(path, 'w', newline='') as file:
-        writer = None
-        for case, *outcomes in results:
-            for name, outcome in zip(('old', 'new'), outcomes):
-                if isinstance(outcome, Failure):
-                    continue
-                line = {'case': case.name, 'row': case.row, 'build': name,
-                        **Run(outcome, case).numbers()}
-                if not writer:
-                    writer = csv.DictWriter(file, list(line))
-                    writer.writeheader()
-                writer.writerow(line)
+        writer = csv.DictWriter(file, list(lines[0]) if lines else [])
+        writer.writeheader()
+        writer.writerows(lines)
