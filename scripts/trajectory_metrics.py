@@ -83,7 +83,7 @@ def pose_nees(poses, covariances, truth):
 
 
 def chi_square_mean_bounds(degrees, runs, confidence=0.95):
-    """Two-sided bounds of the mean over `runs` values of a chi-square variable of `degrees`, even."""
+    """Two-sided, of the mean over `runs` values of a chi-square variable. `degrees` is even."""
     half = degrees * runs // 2
     log_factorial = np.cumsum(np.log(np.maximum(1, np.arange(half))))
 
