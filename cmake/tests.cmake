@@ -24,6 +24,11 @@ foreach(name commands machines rosrun)
     "AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION};AMS_TEST_BAG=${test_bag};AMS_BUILT=${CMAKE_BINARY_DIR}")
 endforeach()
 
+add_test(NAME ${PROJECT_NAME}_compare_runs COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE}
+  ${CMAKE_CURRENT_SOURCE_DIR}/test/tools/compare_runs_test.py)
+set_tests_properties(${PROJECT_NAME}_compare_runs PROPERTIES ENVIRONMENT
+  AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+
 add_test(NAME ${PROJECT_NAME}_house
   COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/include_graph_test.py)
 add_test(NAME ${PROJECT_NAME}_words
