@@ -229,8 +229,7 @@ std::vector<double> StartAdjustment::noiseOfFeatures(const std::vector<FeatureId
     for (const FeatureMeasurement& m : image.measurements) {
       const auto it = std::lower_bound(ids.begin(), ids.end(), m.id);
       if (it != ids.end() && *it == m.id && m.sigma_px > 0.0)
-        noise[it - ids.begin()] =
-            std::max(kCleanestNoise, m.sigma_px / image.sigma_px * std::sqrt(m.lasting));
+        noise[it - ids.begin()] = std::max(kCleanestNoise, m.sigma_px / image.sigma_px);
     }
   return noise;
 }

@@ -162,12 +162,8 @@ void FeatureMap::learnSlope(const VisibleFeature& feature, const Template& expec
     active_matching_slam::learnSlope(image, pixel, expected, feature.view, &known->patch);
 }
 
-void FeatureMap::seeNoise(FeatureId id, double sigma_px) {
-  if (MapFeature* feature = findMutable(id)) feature->noise.see(sigma_px);
-}
-
-void FeatureMap::learnNoise(FeatureId id, const Eigen::Vector2d& residual_px, double shown_px) {
-  if (MapFeature* feature = findMutable(id)) feature->noise.learn(residual_px, shown_px);
+void FeatureMap::learnNoise(FeatureId id, const Eigen::Vector2d& residual) {
+  if (MapFeature* feature = findMutable(id)) feature->noise.learn(residual);
 }
 
 double FeatureMap::expectedMatches(const std::vector<VisibleFeature>& visible) const {

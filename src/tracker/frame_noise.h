@@ -4,43 +4,45 @@
 #include <vector>
 
 #include "active_matching_slam/filter/ekf.h"
-#include "active_matching_slam/filter/match_noise.h"
+#include "active_matching_slam/filter/measurement_noise.h"
 #include "active_matching_slam/map/feature_map.h"
 
 namespace active_matching_slam {
 
-/// All that the tracker has to do with the noise of matches: what each match's is, what updates
-/// teach about it, and the process noise of landmarks, which goes by it.
+/// All that the tracker has to do with noise: the process noise of landmarks, R of each match, and
+/// what updates teach about it (MeasurementNoise).
 class FrameNoise {
  public:
-  void reset() { *this = FrameNoise(); }
+  explicit FrameNoise(const FilterOptions& options) : options_(options), noise_(options) {}
+  void setOptions(const FilterOptions& options);
+  void reset() { noise_.reset(); }
 
   /// Adds the landmarks' process noise of `interval_s`. After Ekf::predict().
-  void addProcessNoise(const CameraModel& camera, double interval_s, const FeatureMap& map,
-                       Ekf* filter) const;
+  void predict(const CameraModel& camera, double interval_s, Ekf* filter);
 
-  /// Standard deviation per axis [px] that gates and matchers allow a match: an upper bound, since
-  /// that is before anything is known of the image.
-  static double gateSigma_px(const FilterOptions& options) { return options.sigma_px; }
+  /// Standard deviation per axis [px] that gates and matchers allow a match.
+  double gateSigma_px() const { return noise_.gateSigma_px(); }
 
-  /// Sets the noise of the measurements of one image, ascending by id. They come with the sigma of
-  /// their template's fit (SearchMatch::sigma_px). `is_adjusted`: whether the initialiser will use
-  /// a feature's matches once more.
-  void weigh(const FilterOptions& options, const std::function<bool(FeatureId)>& is_adjusted,
-             FeatureMap* map, std::vector<FeatureMeasurement>* measurements);
+  /// Sets R of the measurements of one image, which come with the sigma of their template's fit
+  /// (SearchMatch::sigma_px). `is_adjusted`: whether a feature's matches take part in the bundle
+  /// adjustment of the first images as well.
+  void weigh(const std::function<bool(FeatureId)>& is_adjusted, const FeatureMap& map,
+             std::vector<FeatureMeasurement>* measurements);
 
-  /// Learns from what the update by these measurements left over.
+  /// What is known of the variance factor common to these measurements.
+  NoisePrior prior() const;
+
+  /// Learns from the post-fit residuals of the measurements weighed last.
   void learn(const UpdateReport& report, const std::vector<FeatureMeasurement>& measurements,
              FeatureMap* map);
 
-  /// Median standard deviation of matches in the present image, per axis [px].
-  double typicalSigma_px(const FilterOptions& options) const {
-    return match_noise_.sigma_px(options);
-  }
+  /// Standard deviation per axis [px] of a typical match in the last image.
+  double typicalSigma_px() const { return noise_.typicalSigma_px(); }
 
  private:
-  MatchNoise match_noise_;
-  std::vector<FeatureMeasurement> last_;  ///< measurements of the image weighed before
+  FilterOptions options_;
+  MeasurementNoise noise_;
+  std::vector<FitPrecision> fits_;  ///< of the measurements weighed last
 };
 
 }  // namespace active_matching_slam

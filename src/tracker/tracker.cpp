@@ -54,6 +54,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
         "while a map is kept");
   cascade_.setMatcher(options.matcher);
   filter_.setOptions(withTrustIn(camera_.calibration(), options.filter));
+  noise_.setOptions(options.filter);
   relocaliser_ = Relocaliser({}, options.map, options.image);
   options_ = options;
 }

@@ -30,6 +30,7 @@ class Tracker::Implementation {
       : camera_(camera),
         options_(options),
         filter_(withTrustIn(camera.calibration(), options.filter)),
+        noise_(options.filter),
         cascade_(options.matcher),
         relocaliser_({}, options.map, options.image) {
     checkTrackerOptions(options);

@@ -55,7 +55,7 @@ void Tracker::Implementation::observeStructure(const std::vector<VisibleFeature>
   std::vector<FeatureId> ids;
   for (const VisibleFeature& feature : visible) ids.push_back(feature.id);
   const PredictedMeasurements predicted =
-      filter_.predictMeasurements(camera_, ids, options_.structure_accelerations);
+      filter_.predictMeasurements(camera_, ids, 0.0, options_.structure_accelerations);
   structure_.addFrame(predicted.ids, predicted.S);
 }
 
@@ -133,7 +133,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
     MapFeature feature;
     feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
                                                 relative_sigma * inverse_depth,
-                                                noise_.typicalSigma_px(options_.filter));
+                                                noise_.typicalSigma_px());
     if (feature.id < 0) continue;
     first_sights.push_back({feature.id, corner.pixel, 0.0});
     feature.patch = std::move(*patch);

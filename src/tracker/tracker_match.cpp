@@ -18,11 +18,11 @@ void Tracker::Implementation::predict(double interval_s) {
   if (poor_frames_ == 0) {
     T_world_reference_ = filter_.camera().poseWorldCamera();
   } else {
-    filter_.doubtVelocity(kVelocityDecay);
+    filter_.decayVelocity(kVelocityDecay);
   }
   interval_s = std::min(interval_s, options_.max_frame_interval_s);
   filter_.predict(interval_s);
-  noise_.addProcessNoise(camera_, interval_s, map_, &filter_);
+  noise_.predict(camera_, interval_s, &filter_);
 }
 
 /// Features that should be seen and the templates to search them by.
@@ -47,12 +47,12 @@ void Tracker::Implementation::chooseCandidates(FrameState* current) const {
 void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   std::vector<FeatureId> ids;
   for (const VisibleFeature& feature : current->candidates) ids.push_back(feature.id);
-  PredictedMeasurements predicted = filter_.predictMeasurements(camera_, ids);
+  const double sigma_px = noise_.gateSigma_px();
+  PredictedMeasurements predicted = filter_.predictMeasurements(camera_, ids, sigma_px);
   MeasurementPrior& prior = current->prior;
   prior.ids = std::move(predicted.ids);
   prior.z = std::move(predicted.z);
   prior.S = std::move(predicted.S);
-  const double sigma_px = FrameNoise::gateSigma_px(options_.filter);
   prior.noise_variance_px2 = sigma_px * sigma_px;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {
@@ -92,17 +92,18 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
 /// Updates the filter by the matches, and learns from them.
 void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) {
   current->measurements = selectMeasurements(*current);
-  noise_.weigh(
-      options_.filter, [this](FeatureId id) { return start_adjustment_.adjusts(id); }, &map_,
-      &current->measurements);
-  frame->match_sigma_px = noise_.typicalSigma_px(options_.filter);
+  noise_.weigh([this](FeatureId id) { return start_adjustment_.adjusts(id); }, map_,
+               &current->measurements);
+  frame->match_sigma_px = noise_.typicalSigma_px();
 
-  const UpdateReport report = filter_.update(camera_, current->measurements);
+  // While the depths are a guess, residuals show the guess.
+  const bool is_guess = start_adjustment_.areDepthsGuessed();
+  const UpdateReport report =
+      filter_.update(camera_, current->measurements, is_guess ? NoisePrior() : noise_.prior());
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 
-  // While the depths are a guess, residuals show the guess.
-  if (!start_adjustment_.areDepthsGuessed()) noise_.learn(report, current->measurements, &map_);
+  if (!is_guess) noise_.learn(report, current->measurements, &map_);
   learnSlopes(*current);
   recordSearches(*current, frame->index);
 }

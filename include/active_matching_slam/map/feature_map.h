@@ -7,7 +7,7 @@
 
 #include "active_matching_slam/camera/camera_model.h"
 #include "active_matching_slam/filter/ekf.h"
-#include "active_matching_slam/filter/match_noise.h"
+#include "active_matching_slam/filter/measurement_noise.h"
 #include "active_matching_slam/image/patch.h"
 #include "active_matching_slam/image/template.h"
 #include "active_matching_slam/image/warp.h"
@@ -27,7 +27,7 @@ struct MapFeature {
   FeatureRateStatistics rates;  ///< learnt for the matchers
   /// Innovation less the frame's median, averaged over about the last ten matches [px].
   Eigen::Vector2d drift_px = Eigen::Vector2d::Zero();
-  FeatureNoise noise;  ///< of its matches
+  LandmarkNoise noise;  ///< of its matches
   std::int64_t first_frame = 0;
   std::int64_t last_matched_frame = 0;
 };
@@ -85,9 +85,8 @@ class FeatureMap {
   void learnSlope(const VisibleFeature& feature, const Template& expected, const cv::Mat& image,
                   const Eigen::Vector2d& pixel);
 
-  /// Learn how noisy the matches of a feature are: see FeatureNoise. Ignore unknown ids.
-  void seeNoise(FeatureId id, double sigma_px);
-  void learnNoise(FeatureId id, const Eigen::Vector2d& residual_px, double shown_px);
+  /// LandmarkNoise::learn(). Ignores unknown ids.
+  void learnNoise(FeatureId id, const Eigen::Vector2d& residual);
 
   /// How many of these features will probably be matched, by their recent record.
   double expectedMatches(const std::vector<VisibleFeature>& visible) const;

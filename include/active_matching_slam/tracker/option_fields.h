@@ -66,13 +66,14 @@ void visitOptions(Options& o, Visitor&& visit) {
   visit(F{"filter/sigma_px", "noise of a matched image point, per axis [px]", true},
         o.filter.sigma_px, 0.05, 20.0);
   visit(F{"filter/minimum_sigma_px",
-          "updates trust matches that show less noise, down to this; sigma_px: never [px]", true},
+          "least noise that a match is taken to have, whatever residuals show [px]", true},
         o.filter.minimum_sigma_px, 0.01, 20.0);
-  visit(F{"filter/corner_wander_px",
-          "by how much a corner moves in its patch as the view of it turns, per axis and root of a "
-          "radian [px]",
+  visit(F{"filter/noise_memory_s", "time within which the noise of matches may change [s]", true},
+        o.filter.noise_memory_s, 1e-3, 1e3);
+  visit(F{"filter/landmark_noise_px",
+          "process noise of a landmark as the view of it turns, per axis and root of a radian [px]",
           true},
-        o.filter.corner_wander_px, 0.0, 20.0);
+        o.filter.landmark_noise_px, 0.0, 20.0);
   visit(F{"filter/initial_sigma_velocity_mps", "at start, per axis [m/s]", true},
         o.filter.initial_sigma_velocity_mps, 1e-3, 100.0);
   visit(F{"filter/initial_sigma_angular_velocity_rps", "at start, per axis [rad/s]", true},
@@ -94,10 +95,6 @@ void visitOptions(Options& o, Visitor&& visit) {
           "of the three before this, where camera_info has no distortion; 1 for rectified images",
           true},
         o.filter.uncalibrated_factor, 1.0, 100.0);
-  visit(F{"filter/calibration_share",
-          "of each correction of the calibration, how much is made; less than 1 since errors last",
-          true},
-        o.filter.calibration_share, 1e-3, 1.0);
   visit(F{"filter/initial_inverse_depth",
           "prior of a new feature; fixes the map unit when scale is "
           "free [1/m]",
