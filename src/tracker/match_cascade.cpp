@@ -12,6 +12,7 @@
 #include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/false_alarm.h"
 #include "active_matching_slam/matching/innovation_gate.h"
+#include "active_matching_slam/math/pixel_scale.h"
 #include "active_matching_slam/tracker/image_motion_prior.h"
 
 namespace active_matching_slam {
@@ -75,7 +76,8 @@ void MatchCascade::match(const MatchOptions& matching, bool fallbacks, FrameStat
 }
 
 void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* frame) {
-  const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2;
+  const double scale = pixelScale(frame->image.cols);
+  const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2 * scale * scale;
   const auto guided = is_wide ? guidedPrior(*frame) : std::nullopt;
   const MeasurementPrior& prior = guided ? *guided : frame->prior;
   frame->matching = matcher_->match(prior, frame->search,
