@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -49,7 +50,7 @@ struct MatchCascade::Fallback {
   ImageFeatureSearch& search;    ///< a new one, or that of the attempts before, which goes on
   double budget_fraction = 1.0;  ///< of what is left
   double minimum_matches = 0.0;
-  double maximum_nis = 0.0;  ///< a matcher without a joint distance has 0
+  double maximum_nis = std::numeric_limits<double>::infinity();  ///< of its joint distance
 };
 
 MatchCascade::MatchCascade(const std::string& matcher, const MatchCascadeOptions& options)
