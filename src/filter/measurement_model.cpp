@@ -8,8 +8,9 @@
 namespace active_matching_slam {
 namespace {
 
-/// Rows that the image runs while one is read, beyond which the row of a feature can't be predicted.
-/// Derivation: each guess of the row multiplies its error by this; four leave a sixteenth.
+/// Rows that the image runs while one is read, beyond which the row of a feature can't be
+/// predicted. Derivation: each guess of the row multiplies its error by this; four leave a
+/// sixteenth.
 constexpr double kMostRowsPerRow = 0.5;
 
 }  // namespace

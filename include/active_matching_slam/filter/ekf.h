@@ -85,8 +85,8 @@ class Ekf {
   void predict(double interval_s);
 
   /// Landmark process noise: where a corner lies in its patch depends on the view of it. As that
-  /// turned in the last `interval_s`, each landmark moved across its ray from the camera by a random
-  /// walk of `sigma_px` per axis and root of a radian. After predict(interval_s).
+  /// turned in the last `interval_s`, each landmark moved across its ray from the camera by a
+  /// random walk of `sigma_px` per axis and root of a radian. After predict(interval_s).
   void addLandmarkNoise(const CameraModel& camera, double interval_s, double sigma_px);
 
   /// Velocities decay to `fraction` of themselves, 0 to 1; what they lose is one standard deviation
