@@ -62,6 +62,12 @@ class Documents(unittest.TestCase):
                     headings = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.M)
                     self.assertIn(fragment, map(anchor, headings), document.name)
 
+    def test_lines_of_text_are_at_most_120_columns_long(self):
+        for document in DOCUMENTS:
+            for number, line in enumerate(document.read_text(encoding="utf-8").splitlines(), 1):
+                self.assertTrue(len(line) <= 120 or line.startswith(("|", "![")),
+                                "{}:{}".format(document.name, number))
+
     def test_every_script_named_exists(self):
         for place, line in lines():
             for name in re.findall(r"\bscripts/(\w+)", line):
