@@ -5,6 +5,7 @@
 
 #include <cstdio>
 
+#include "accuracy/long_runs.h"
 #include "active_matching_slam/evaluation/trajectory_error.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
@@ -49,9 +50,10 @@ BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool fall
   return run;
 }
 
-class SimulatedRepetition : public testing::TestWithParam<double> {};
+class LongSimulatedRepetition : public test::LongRuns,
+                                public testing::WithParamInterface<double> {};
 
-TEST_P(SimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
+TEST_P(LongSimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
   const BoardRun active = trackCheckerboard("active", GetParam(), true);
   EXPECT_EQ(active.tracked, active.frames);
   EXPECT_LT(active.error_of_path, 0.003);
@@ -60,7 +62,8 @@ TEST_P(SimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
   EXPECT_LT(active.error_of_path, 1.5 * jcbb.error_of_path);
 }
 
-TEST_P(SimulatedRepetition, ActiveSearchAloneLosesItAndRansacAloneIsNoBetterThanActiveMatching) {
+TEST_P(LongSimulatedRepetition,
+       ActiveSearchAloneLosesItAndRansacAloneIsNoBetterThanActiveMatching) {
   const BoardRun active = trackCheckerboard("active", GetParam(), true);
   const BoardRun search = trackCheckerboard("active_search", GetParam(), false);
   EXPECT_LT(search.tracked, search.frames);
@@ -68,7 +71,7 @@ TEST_P(SimulatedRepetition, ActiveSearchAloneLosesItAndRansacAloneIsNoBetterThan
   EXPECT_TRUE(ransac.tracked < ransac.frames || ransac.error_of_path > 0.9 * active.error_of_path);
 }
 
-INSTANTIATE_TEST_SUITE_P(Hertz, SimulatedRepetition, testing::Values(10.0, 7.5));
+INSTANTIATE_TEST_SUITE_P(Hertz, LongSimulatedRepetition, testing::Values(10.0, 7.5));
 
 }  // namespace
 }  // namespace active_matching_slam
