@@ -11,24 +11,26 @@ namespace {
 
 /// Smoothing constant of the exponential window of `kWindow` residuals.
 constexpr double kSmoothing = 2.0 / (LandmarkNoise::kWindow + 1);
-/// Residuals count as no farther out than this, in standard deviations: matches beyond are wrong
-/// ones that passed (Standard: clipping of the influence function, Huber 1981).
+/// Residuals are clipped to so many of the landmark's own standard deviations, as outliers that
+/// passed the gate (Standard: bounded influence, Huber 1981). Derivation: at 4 a Gaussian's
+/// variance loses 1e-4 of itself.
 constexpr double kClip = 4.0;
-/// Of a place that is only searched at whole pixels [px^2]. Derivation: uniform over one.
+/// Rounding error of a search at whole pixels [px^2]. Derivation: variance of a uniform one.
 constexpr double kPixelVariance = 1.0 / 12.0;
-/// Degrees of freedom a landmark's scale remembers at most, besides its prior. Cost: the more, the
-/// later a landmark that has become worse counts for less.
+/// Degrees of freedom that a landmark's scale remembers at most, besides its prior's. Cost: it is
+/// known to sqrt(2 / degrees) = 10 % then; more would follow changes later.
 constexpr double kLandmarkMemory = 200.0;
 
 }  // namespace
 
 void LandmarkNoise::learn(const Eigen::Vector2d& residual) {
   if (!residual.allFinite()) return;
-  const Eigen::Vector2d clipped = residual.cwiseMax(-kClip).cwiseMin(kClip);
-  scale_.learn(clipped.squaredNorm(), 2.0);
+  const double scale = scale_.scale();
+  const Eigen::Vector2d standardised =
+      (residual / std::sqrt(scale)).cwiseMax(-kClip).cwiseMin(kClip);
+  scale_.learn(scale * standardised.squaredNorm(), 2.0);
   if (scale_.degrees() > kPriorDegrees + kLandmarkMemory)
     scale_.forget((kPriorDegrees + kLandmarkMemory) / scale_.degrees());
-  const Eigen::Vector2d standardised = clipped / std::sqrt(scale_.scale());
   mean_ += kSmoothing * (standardised - mean_);
   mean_variance_ = std::pow(1.0 - kSmoothing, 2) * mean_variance_ + kSmoothing * kSmoothing;
   ++residuals_;
@@ -74,7 +76,7 @@ void MeasurementNoise::observeFits(const std::vector<FitPrecision>& fits) {
 
 void MeasurementNoise::learn(double scale, double redundancy) {
   if (!(scale > 0.0) || !std::isfinite(scale) || !(redundancy > 0.0) || !(fit_px_ > 0.0)) return;
-  // Of the variance that a typical match was expected to have.
+  // `scale` is in units of the variance expected of a typical match, c_k in those of its fit.
   const double observed = scale * std::pow(typicalSigma_px() / fit_px_, 2);
   scale_.learn(redundancy * observed, redundancy);
   has_learnt_ = true;

@@ -13,19 +13,18 @@ namespace active_matching_slam {
 namespace {
 
 constexpr int kMotion = CameraError::kMotionSize;
-/// Linearised anew while the last step moved predictions by more than this part of their noise, in
-/// the root mean square. Cost: a step more halves what is left at a fifth of a sigma.
+/// Linearised anew while the last linearisation erred in the predictions by more than this fraction
+/// of their standard deviation, root mean square. Cost: each costs as much as a whole update.
 constexpr double kNonlinearityTolerance = 0.2;
 /// Degrees of freedom of the t distribution of errors (Standard: Lange, Little & Taylor 1989).
 constexpr double kTailDegrees = 4.0;
-/// By this much all variances are larger, so that the covariance is right where errors are Gaussian
-/// after all. Derivation: weights w = 6 / (4 + x), x chi-square of 2 degrees, claim the variance 1
-/// / E[w]; the M-estimate has E[w^2 x / 2] / E[w + x w']^2 = 1.0919 (Huber 1981), E[w] = 1.0840;
-/// their product.
+/// Factor of all variances by which the covariance is right where errors are Gaussian after all.
+/// Derivation: for weights w(x) = 6 / (4 + x), x chi-square of 2 degrees, the estimate is taken to
+/// have the variance 1 / E[w], E[w] = 1.0840, and has E[w^2 x / 2] / E[w + x w']^2 = 1.0919 (Huber
+/// 1981); their ratio.
 constexpr double kTailVariance = 1.1836;
-/// Mean of a Gaussian residual's weighted square over its degrees of freedom. Derivation: E[w x] /
-/// (2 kTailVariance) of the above.
-constexpr double kTailConsistency = 0.7030;
+/// Mean of a Gaussian error's weighted square per degree of freedom. Derivation: E[w x] / 2.
+constexpr double kTailSquare = 0.8320;
 constexpr double kTailTolerance = 0.02;  ///< Cost: of the variances, where reweighing ends
 constexpr int kMostTailRounds = 4;       ///< Cost
 
@@ -100,44 +99,41 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> RobustUpdate::impulseGain(const Eigen::
   return information.llt().solve(weighted);
 }
 
-/// `weighted`: S^-1 y for the innovation y. The leave-one-out residual of measurement i is
-/// ([S^-1]_ii)^-1 [S^-1 y]_i, of covariance ([S^-1]_ii)^-1. `expected_px2`: R before tails. Whether
-/// R, and S, have changed.
+/// `weighted`: S^-1 y for the innovation y. The leave-one-out residual e of measurement i is
+/// ([S^-1]_ii)^-1 [S^-1 y]_i, of covariance C = ([S^-1]_ii)^-1. `expected_px2`: R before tails,
+/// `applied` times the prior's. Whether R, and S, have changed.
+///
+/// Variance component estimation of the scale: with q = C^-1 e, R q^T q has the mean tr(R C^-1),
+/// twice the redundancy number; weighted, kTailSquare of it. C is with R before tails: else what
+/// the residual itself did to its weight would bias the scale by its redundancy.
 bool RobustUpdate::reweigh(const Eigen::VectorXd& weighted, const std::vector<double>& expected_px2,
-                           Eigen::MatrixXd& S) {
+                           double applied, Eigen::MatrixXd& S) {
   const Eigen::MatrixXd inverse_root = inverseRoot(llt_);
-  bool any = false;
+  bool has_changed = false;
+  double squares = 0.0;
+  noise_degrees_ = 0.0;
   redundancy_.clear();
   for (Eigen::Index i = 0; i < weighted.size() / 2; ++i) {
     UsableMeasurement& m = measurements_[i];
     const Eigen::Matrix2d left_out = inverseBlock(inverse_root, i).inverse();
     const Eigen::Matrix2d C = left_out - (m.variance_px2 - expected_px2[i]) * m.shape;
+    const Eigen::Matrix2d C_inverse = C.inverse();
     const Eigen::Vector2d residual = left_out * weighted.segment<2>(2 * i);
-    const double chi2 = residual.dot(C.inverse() * residual);
-    const double weight = (kTailDegrees + 2.0) / (kTailDegrees + chi2);
+    const Eigen::Vector2d q = C_inverse * residual;
+    const double weight = (kTailDegrees + 2.0) / (kTailDegrees + residual.dot(q));
+    squares += weight * expected_px2[i] * q.dot(m.shape * q);
+    noise_degrees_ += expected_px2[i] * (m.shape * C_inverse).trace();
+
     const double change_px2 = kTailVariance / weight * expected_px2[i] - m.variance_px2;
-    any |= std::abs(change_px2) > kTailTolerance * m.variance_px2;
+    has_changed |= std::abs(change_px2) > kTailTolerance * m.variance_px2;
     m.variance_px2 += change_px2;
     S.block<2, 2>(2 * i, 2 * i) += change_px2 * m.shape;
     // The post-fit residual of an innovation y is R S^-1 y, of covariance R S^-1 R.
     redundancy_.push_back(0.5 * m.variance_px2 *
                           (m.shape * (left_out + change_px2 * m.shape).inverse()).trace());
   }
-  return any;
-}
-
-/// Variance component estimation: y^T S^-1 R S^-1 y has the mean tr(S^-1 R). R is `applied` times
-/// the prior's.
-void RobustUpdate::estimateScale(const Eigen::VectorXd& weighted, double applied) {
-  double squares = 0.0;
-  noise_degrees_ = 0.0;
-  for (std::size_t i = 0; i < measurements_.size(); ++i) {
-    const UsableMeasurement& m = measurements_[i];
-    const Eigen::Vector2d w = weighted.segment<2>(2 * i);
-    squares += m.variance_px2 * w.dot(m.shape * w);
-    noise_degrees_ += 2.0 * redundancy_[i];
-  }
-  noise_scale_ = applied * squares / (kTailConsistency * noise_degrees_);
+  noise_scale_ = applied * squares / (kTailSquare * noise_degrees_);
+  return has_changed;
 }
 
 /// Posterior mean of the factor common to all R.
@@ -160,16 +156,15 @@ bool RobustUpdate::estimateNoise(const Eigen::VectorXd& innovation, Eigen::Matri
   nis_ = innovation.dot(weighted);
   std::vector<double> prior_px2;
   for (const UsableMeasurement& m : measurements_) prior_px2.push_back(m.variance_px2);
-  std::vector<double> expected_px2 = prior_px2;
+  std::vector<double> expected_px2(prior_px2.size());
   const double least = std::min(1.0, noise_.minimum_px2 / medianOf(prior_px2));
   double applied = 1.0;
   for (int round = 0; round < kMostTailRounds; ++round) {
-    const bool has_changed = reweigh(weighted, expected_px2, S);
+    for (std::size_t i = 0; i < expected_px2.size(); ++i) expected_px2[i] = applied * prior_px2[i];
+    const bool has_changed = reweigh(weighted, expected_px2, applied, S);
     if (!weigh()) return false;
     if (round > 0 && !has_changed) break;
-    estimateScale(weighted, applied);
     applied = std::max(posteriorScale(), least);
-    for (std::size_t i = 0; i < expected_px2.size(); ++i) expected_px2[i] = applied * prior_px2[i];
   }
   residuals_px_.clear();
   for (std::size_t i = 0; i < measurements_.size(); ++i) {

@@ -31,8 +31,9 @@ using ImpulseRoot = Eigen::Matrix<double, CameraError::kMotionSize, 6>;
 /// - Tails: errors are t-distributed; each measurement's R is weighed by its leave-one-out residual
 ///   (iteratively reweighted; Lange, Little & Taylor 1989).
 /// - Scale: R of all is multiplied by the posterior mean of their common variance factor, inverse
-///   gamma with the prior's degrees of freedom, from the post-fit residuals by variance component
-///   estimation (Förstner 1979): what a surprise of the motion explains is no residual.
+///   gamma with the prior's degrees of freedom, from the leave-one-out residuals by variance
+///   component estimation (Förstner 1979). An unexpected motion, which all measurements share, is
+///   in the prediction from the others and does not count as noise.
 /// - Correlation over time: map, calibration and past motion are corrected by R inflated, the
 ///   impulse since the last image, which is independent of the past, by R.
 /// All errors count from the prior mean; the Jacobian of an iteration is that of the mean reached.
@@ -72,8 +73,7 @@ class RobustUpdate {
   bool estimateNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S);
   Eigen::Matrix<double, 6, Eigen::Dynamic> impulseGain(const Eigen::MatrixXd& B) const;
   bool reweigh(const Eigen::VectorXd& weighted, const std::vector<double>& expected_px2,
-               Eigen::MatrixXd& S);
-  void estimateScale(const Eigen::VectorXd& weighted, double applied);
+               double applied, Eigen::MatrixXd& S);
   double posteriorScale() const;
   bool isLinearEnough(const Eigen::VectorXd& expected_pixels) const;
 

@@ -9,8 +9,8 @@
 
 namespace active_matching_slam {
 
-/// All that the tracker has to do with noise: the process noise of landmarks, R of each match, and
-/// what updates teach about it (MeasurementNoise).
+/// Noise of the tracker's landmarks and matches: process noise of the former, R of the latter, which
+/// is learnt from the updates' residuals (MeasurementNoise).
 class FrameNoise {
  public:
   explicit FrameNoise(const FilterOptions& options) : options_(options), noise_(options) {}
@@ -29,7 +29,7 @@ class FrameNoise {
   void weigh(const std::function<bool(FeatureId)>& is_adjusted, const FeatureMap& map,
              std::vector<FeatureMeasurement>* measurements);
 
-  /// What is known of the variance factor common to these measurements.
+  /// Prior of the variance factor common to these measurements.
   NoisePrior prior() const;
 
   /// Learns from the post-fit residuals of the measurements weighed last.

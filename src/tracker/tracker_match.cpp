@@ -96,14 +96,14 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
                &current->measurements);
   frame->match_sigma_px = noise_.typicalSigma_px();
 
-  // While the depths are a guess, residuals show the guess.
-  const bool is_guess = start_adjustment_.areDepthsGuessed();
-  const UpdateReport report =
-      filter_.update(camera_, current->measurements, is_guess ? NoisePrior() : noise_.prior());
+  // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
+  const bool are_depths_guessed = start_adjustment_.areDepthsGuessed();
+  const NoisePrior prior = are_depths_guessed ? NoisePrior() : noise_.prior();
+  const UpdateReport report = filter_.update(camera_, current->measurements, prior);
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 
-  if (!is_guess) noise_.learn(report, current->measurements, &map_);
+  if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
   learnSlopes(*current);
   recordSearches(*current, frame->index);
 }

@@ -258,8 +258,9 @@ TEST_F(EkfUpdate, CovarianceForOtherAccelerationsIsWhatTheyWouldHavePredicted) {
   const Eigen::MatrixXd expected = jerky.predictMeasurements(model_, predicted.ids).S;
   ASSERT_GT(relativeDifference(predicted.S, expected), 0.1);
   // But for what linearisation leaves out, which is that of the prediction made.
-  EXPECT_LT(relativeDifference(calm.predictMeasurements(model_, predicted.ids, 0.0, jerks).S, expected),
-            1e-3);
+  EXPECT_LT(
+      relativeDifference(calm.predictMeasurements(model_, predicted.ids, 0.0, jerks).S, expected),
+      1e-3);
 
   Random random(6);
   calm.update(model_, noisyMeasurements(calm, model_, 1.0, random));

@@ -34,9 +34,10 @@ struct FeatureMeasurement {
   Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
 };
 
-/// What is known of the variance factor common to an image's measurements.
+/// Prior of the variance factor that R of all measurements of an image have in common: inverse
+/// gamma, of mean 1.
 struct NoisePrior {
-  /// Of freedom, that it is as sure as to be 1; infinite: R is known.
+  /// Degrees of freedom; infinite: R is known.
   double degrees = std::numeric_limits<double>::infinity();
   double minimum_px2 = 0.0;  ///< bound of a typical measurement's variance per axis
 };
@@ -52,7 +53,8 @@ struct UpdateReport {
   /// Post-fit residual of each, first order, along axes in which its noise is of equal size and
   /// independent [px]; zero: not used.
   std::vector<Eigen::Vector2d> residual_px;
-  /// Variance of the residuals over what was expected, and the degrees of freedom that tell it.
+  /// Estimate of the variance factor common to the measurements, 1 where R is right (see
+  /// NoisePrior), and its degrees of freedom.
   double noise_scale = 1.0, noise_degrees = 0.0;
 };
 

@@ -29,8 +29,8 @@ class VarianceScale {
   double scale_, degrees_;
 };
 
-/// What a landmark's residuals tell of the variance of its matches: its scale relative to that of
-/// the other landmarks', and what their errors have in common over time.
+/// Noise of a landmark's matches by their residuals: its variance relative to other landmarks', and
+/// its correlation over time.
 class LandmarkNoise {
  public:
   /// Variance factor, 1 for a landmark like the others. Hierarchical prior: so until it has
@@ -49,8 +49,8 @@ class LandmarkNoise {
   }
   bool hasInflation() const { return residuals_ >= kWindow; }
 
-  /// Residuals that the exponential window of the mean spans: the lag beyond which their
-  /// autocorrelation is not looked at. Cost: the longer, the later it is known of a landmark.
+  /// Residuals that the exponential window of the mean spans: about the lag up to which their
+  /// autocorrelation counts. Cost: the longer, the later it is known of a landmark.
   static constexpr int kWindow = 16;
 
  private:
@@ -59,12 +59,11 @@ class LandmarkNoise {
   double mean_variance_ = 0.0;
   int residuals_ = 0;
 
-  /// Degrees of freedom of the prior. Cost: the matches, half as many, until a landmark's own
-  /// residuals count for as much; with fewer, its scale follows chance.
+  /// Prior of the scale. Derivation: landmarks differ by sqrt(2 / degrees) = 22 % in variance.
   static constexpr double kPriorDegrees = 40.0;
 };
 
-/// What a template's least-squares fit tells of a match (TemplateFit), or that there was none.
+/// Precision of a match by the least-squares fit of its template (TemplateFit), if any.
 struct FitPrecision {
   double sigma_px = 0.0;  ///< per axis; 0: the fit did not converge
 };
@@ -85,11 +84,11 @@ class MeasurementNoise {
   void reset() { *this = MeasurementNoise(options_); }
 
   /// Standard deviation per axis [px] of a match of `landmark` in the image in hand, at least
-  /// FilterOptions::minimum_sigma_px; FilterOptions::sigma_px where the fit tells nothing.
+  /// FilterOptions::minimum_sigma_px; FilterOptions::sigma_px without a fit.
   double sigma_px(const FitPrecision& fit, const LandmarkNoise& landmark) const;
   /// The same of a typical match in the last image; before any, FilterOptions::sigma_px.
   double typicalSigma_px() const;
-  /// Degrees of freedom that c_k is as sure as, before the image in hand.
+  /// Degrees of freedom of the prior of c_k in the image in hand.
   double degrees() const;
   /// FeatureMeasurement::variance_inflation of such a match: its long-run variance over its
   /// variance.
