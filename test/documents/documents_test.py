@@ -160,7 +160,8 @@ class Theory(unittest.TestCase):
         for indent, name, value in re.findall(r"^( *)(\w+):(.*)$", yaml, re.M):
             if not value:
                 group = name + "/"
-            values[(group if indent else "") + name] = {cls.number(value)}
+            full = (group if indent else "") + name
+            values[full] = {cls.number(value)} & values.get(name, {cls.number(value)})
         return values
 
     def test_pages_are_short(self):
