@@ -33,6 +33,8 @@ add_test(NAME ${PROJECT_NAME}_house
   COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/include_graph_test.py)
 add_test(NAME ${PROJECT_NAME}_words
   COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/words_test.py)
+add_test(NAME ${PROJECT_NAME}_constants
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/constants_test.py)
 add_test(NAME ${PROJECT_NAME}_symbols
   COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/symbols_test.py
     $<TARGET_FILE:${PROJECT_NAME}>)

@@ -16,7 +16,8 @@ constexpr double kSmoothing = 2.0 / (LandmarkNoise::kWindow + 1);
 constexpr double kClip = 4.0;
 /// Of a place that is only searched at whole pixels [px^2]. Derivation: uniform over one.
 constexpr double kPixelVariance = 1.0 / 12.0;
-/// Degrees of freedom a landmark's scale remembers at most, besides its prior.
+/// Degrees of freedom a landmark's scale remembers at most, besides its prior. Cost: the more, the
+/// later a landmark that has become worse counts for less.
 constexpr double kLandmarkMemory = 200.0;
 
 }  // namespace

@@ -23,8 +23,9 @@ constexpr std::size_t kMinimumFeaturesForMedian = 8;
 /// Largest drift, in the median of all. Derivation: of errors that are isotropic Gaussian, one in
 /// 2^(3.5^2), about 5000, is longer.
 constexpr double kMaximumRelativeDrift = 3.5;
-/// The same at least, whatever the median [px]. Cost: below it, what the filter loses by a feature
-/// that drifts is less than by the feature.
+/// The same at least, whatever the median [px]: the bias of sub-pixel alignment, which goes by
+/// pixels and not by the image's size. Cost: lower, features that are points are retired and must
+/// be started anew.
 constexpr double kMaximumDriftPx = 0.3;
 /// Matched of the features searched in an image, as a fraction of one, below which the image is at
 /// fault. Derivation: an image that is half occluded, with some misses besides, is not.

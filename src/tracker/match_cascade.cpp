@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/false_alarm.h"
 #include "active_matching_slam/matching/innovation_gate.h"
+#include "active_matching_slam/math/pixel_scale.h"
 #include "active_matching_slam/tracker/image_motion_prior.h"
 
 namespace active_matching_slam {
@@ -48,7 +50,7 @@ struct MatchCascade::Fallback {
   ImageFeatureSearch& search;    ///< a new one, or that of the attempts before, which goes on
   double budget_fraction = 1.0;  ///< of what is left
   double minimum_matches = 0.0;
-  double maximum_nis = 0.0;  ///< a matcher without a joint distance has 0
+  double maximum_nis = std::numeric_limits<double>::infinity();  ///< of its joint distance
 };
 
 MatchCascade::MatchCascade(const std::string& matcher, const MatchCascadeOptions& options)
@@ -75,7 +77,8 @@ void MatchCascade::match(const MatchOptions& matching, bool fallbacks, FrameStat
 }
 
 void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* frame) {
-  const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2;
+  const double scale = pixelScale(frame->image.cols);
+  const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2 * scale * scale;
   const auto guided = is_wide ? guidedPrior(*frame) : std::nullopt;
   const MeasurementPrior& prior = guided ? *guided : frame->prior;
   frame->matching = matcher_->match(prior, frame->search,

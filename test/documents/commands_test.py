@@ -33,7 +33,7 @@ PATIENCE_S = 120
 def commands():
     """(document, command) of all documents, without comments, in order."""
     found = []
-    for document in [SOURCE / 'README.md'] + sorted((SOURCE / 'doc').glob('*.md')):
+    for document in [SOURCE / 'README.md'] + sorted((SOURCE / 'doc').rglob('*.md')):
         text = document.read_text(encoding='utf-8').replace('\\\n', ' ')
         blocks = re.findall(r'^    (.*)$', text, re.M)
         inline = re.findall(r'`([^`\n]+)`', text)

@@ -70,7 +70,6 @@ int correctInliers(const FrameState& frame, const Eigen::Vector2d& shift) {
 }
 
 class EveryMatcherOfACascade : public testing::TestWithParam<const char*> {};
-class EveryMixtureMatcherOfACascade : public testing::TestWithParam<const char*> {};
 class EveryJointMatcherOfACascade : public testing::TestWithParam<const char*> {};
 
 TEST_P(EveryMatcherOfACascade, MatchesWhatIsWhereItShouldBe) {
@@ -80,7 +79,7 @@ TEST_P(EveryMatcherOfACascade, MatchesWhatIsWhereItShouldBe) {
   EXPECT_EQ(correctInliers(frame, {3.0, -2.0}), kFeatures);
 }
 
-TEST_P(EveryMixtureMatcherOfACascade, FindsAJerkBeyondTheGatesByTheMotionOfTheImage) {
+TEST_P(EveryMatcherOfACascade, FindsAJerkBeyondTheGatesByTheMotionOfTheImage) {
   const cv::Mat first = texture(1);
   const cv::Mat jerked = shifted(first, {40, 25});
   FrameState without = makeFrame(first, jerked, 4.0);
@@ -110,8 +109,6 @@ TEST_P(EveryJointMatcherOfACascade, AcceptsNothingInAnImageOfSomethingElse) {
 INSTANTIATE_TEST_SUITE_P(MatchCascade, EveryMatcherOfACascade,
                          testing::Values("active_search", "jcbb", "one_point_ransac", "active",
                                          "fast_active", "chow_liu"));
-INSTANTIATE_TEST_SUITE_P(MatchCascade, EveryMixtureMatcherOfACascade,
-                         testing::Values("active_search", "active", "fast_active", "chow_liu"));
 // active_search takes the best score in each gate, whatever the others say.
 INSTANTIATE_TEST_SUITE_P(MatchCascade, EveryJointMatcherOfACascade,
                          testing::Values("jcbb", "one_point_ransac", "active", "fast_active",

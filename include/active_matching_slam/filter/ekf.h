@@ -85,8 +85,8 @@ class Ekf {
   void predict(double interval_s);
 
   /// Landmark process noise: where a corner lies in its patch depends on the view of it. As that
-  /// turned in the last `interval_s`, each landmark moved across its ray from the camera by a random
-  /// walk of `sigma_px` per axis and root of a radian. After predict(interval_s).
+  /// turned in the last `interval_s`, each landmark moved across its ray from the camera by a
+  /// random walk of `sigma_px` per axis and root of a radian. After predict(interval_s).
   void addLandmarkNoise(const CameraModel& camera, double interval_s, double sigma_px);
 
   /// Velocities decay to `fraction` of themselves, 0 to 1; what they lose is one standard deviation
@@ -124,7 +124,8 @@ class Ekf {
   /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this
   /// only chooses the gauge, and keeps what follows from changing the unit.
   void fixScale(double relative_sigma);
-  /// How well a start is taken to know the unit that it chooses.
+  /// Relative standard deviation of the unit that a start chooses. Derivation: it fixes a gauge, so
+  /// that any value far below the errors of lengths, of some 1e-2, and far above rounding will do.
   static constexpr double kFreeScaleSigma = 2e-4;
 
   /// Multiplies all lengths (map, position, velocity and their covariances) by `factor` > 0.

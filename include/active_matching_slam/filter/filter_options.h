@@ -27,7 +27,7 @@ struct FilterOptions {
   /// These: see LensCorrection. As bundle-adjusted calibrations of good practice are repeatable
   /// (.1 %, half a pixel of 500).
   double initial_sigma_focal = 0.001;
-  double initial_sigma_radial = 0.001;
+  double initial_sigma_radial = 0.002;
   double initial_sigma_centre = 0.001;
   /// The lens's three are so many times as large where no distortion was calibrated.
   double uncalibrated_factor = 5.0;

@@ -59,6 +59,8 @@ class LandmarkNoise {
   double mean_variance_ = 0.0;
   int residuals_ = 0;
 
+  /// Degrees of freedom of the prior. Cost: the matches, half as many, until a landmark's own
+  /// residuals count for as much; with fewer, its scale follows chance.
   static constexpr double kPriorDegrees = 40.0;
 };
 

@@ -43,7 +43,7 @@ struct MatchCascadeOptions {
   /// has the next has not.
   double first_budget_fraction = 0.6, fallback_budget_fraction = 0.5;
   /// Area of all 3-sigma gates together from which on the image's motion guides the first attempt
-  /// already [px^2]. Cost: whether an attempt without it comes first.
+  /// already [px^2 of an image 640 wide]. Cost: whether an attempt without it comes first.
   double wide_gates_px2 = 2e5;
   /// Largest decimal logarithm of the number of false alarms. Standard: epsilon-meaningful with
   /// epsilon = 0.1, one accident in ten frames at most (Desolneux, Moisan & Morel 2000).

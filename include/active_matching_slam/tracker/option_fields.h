@@ -63,7 +63,10 @@ void visitOptions(Options& o, Visitor&& visit) {
   visit(F{"filter/sigma_angular_acceleration_rps2",
           "angular acceleration, standard deviation per axis [rad/s^2]", true},
         o.filter.sigma_angular_acceleration_rps2, 1e-3, 1e3);
-  visit(F{"filter/sigma_px", "noise of a matched image point, per axis [px]", true},
+  visit(F{"filter/sigma_px",
+          "noise of a match before any is learnt, and where its template's fit does not converge, "
+          "per axis [px]",
+          true},
         o.filter.sigma_px, 0.05, 20.0);
   visit(F{"filter/minimum_sigma_px",
           "least noise that a match is taken to have, whatever residuals show [px]", true},
@@ -116,7 +119,7 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.image.source_patch_size_px, 7, 101);
   visit(F{"image/match_threshold", "least zero-mean normalised cross-correlation of a match", true},
         o.image.match_threshold, 0.1, 0.999);
-  visit(F{"image/corner_quality", "least share of the strongest corner's response", true},
+  visit(F{"image/corner_quality", "least fraction of the strongest corner's response", true},
         o.image.corner_quality, 1e-6, 1.0);
   visit(F{"image/minimum_contrast", "least standard deviation of a template [grey levels]", true},
         o.image.minimum_contrast, 0.0, 128.0);
@@ -138,7 +141,7 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.map.maximum_scale, 1.0, 20.0);
   visit(F{"map/retire_after_attempts", "a feature searched this often may be retired", true},
         o.map.retire_after_attempts, 1, 100000);
-  visit(F{"map/retire_success_ratio", "... when it was matched less often than this share", true},
+  visit(F{"map/retire_success_ratio", "... when it was matched in less than this fraction", true},
         o.map.retire_success_ratio, 0.0, 1.0);
 
   visit(F{"matching/true_positive_rate", "probability of a match where a feature is (Ptp)", true},
