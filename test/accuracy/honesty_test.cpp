@@ -39,6 +39,7 @@ double meanNees(std::pair<int, int> size_px, const std::string& motion, std::uin
   std::printf("%dx%d %s seed %d: %d of %d frames tracked, NEES %.2f\n", size_px.first,
               size_px.second, motion.c_str(), static_cast<int>(seed), summary.frames_tracked,
               summary.frames, summary.nees_mean.value_or(std::nan("")));
+  std::fflush(stdout);
   EXPECT_EQ(summary.frames_tracked, summary.frames);
   EXPECT_TRUE(summary.nees_mean) << "no covariance is positive definite";
   return summary.nees_mean.value_or(std::nan(""));
@@ -54,8 +55,9 @@ double meanOf(const std::vector<double>& values) {
 TEST(Honesty, OfThePoseOnShortFilms) {
   std::vector<double> nees;
   for (const auto& size_px : kSizes_px) {
-    nees.push_back(meanNees(size_px, "slow", 1, 4.0));
-    nees.push_back(meanNees(size_px, "jerky", 2, 4.0));
+    const bool is_large = size_px.first > 640;  // takes ten times as long to render as the small
+    nees.push_back(meanNees(size_px, "slow", 1, is_large ? 2.0 : 4.0));
+    if (!is_large) nees.push_back(meanNees(size_px, "jerky", 2, 4.0));
   }
   const ChiSquareBounds bounds = chiSquareMeanBounds(kPoseDegrees, static_cast<int>(nees.size()));
   EXPECT_GT(meanOf(nees), bounds.lower / kModellingFactor) << "the covariance is too large";
