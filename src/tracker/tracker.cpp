@@ -32,7 +32,7 @@ void Tracker::Implementation::reset(const std::string& reason) {
   state_ = TrackingState::kWaiting;
   reason_ = reason;
   map_.clear();
-  start_adjustment_.end();
+  initialiser_.end();
   structure_.clear();
   structure_snapshot_ = {};
   filter_.reset(CameraState(), MotionCovariance::Zero());
@@ -63,7 +63,7 @@ void Tracker::Implementation::setScale(double factor) {
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   filter_.rescale(factor);
   map_.rescale(factor);
-  start_adjustment_.rescale(factor);
+  initialiser_.rescale(factor);
   T_world_camera_before_.translation() *= factor;
   scale_source_ = ScaleSource::kService;
 }
@@ -105,8 +105,9 @@ void Tracker::Implementation::follow(const cv::Mat& image, TrackedFrame* frame) 
   match(image, frame);
   frame->timings_ms.match = stage.lap();
   correct(image, frame);
-  if (start_adjustment_.isActive()) adjustStart(frame);
+  const bool is_restarted = initialise(image, frame);
   frame->timings_ms.update = stage.lap();
+  if (is_restarted) return;
   judge();
   maintainMap(image, frame);
   frame->timings_ms.map = stage.lap();

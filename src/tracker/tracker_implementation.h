@@ -8,7 +8,7 @@
 #include "active_matching_slam/filter/match_noise.h"
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/information/map_structure.h"
-#include "active_matching_slam/initialisation/start_adjustment.h"
+#include "active_matching_slam/initialisation/initialiser.h"
 #include "active_matching_slam/map/feature_map.h"
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/matching/matcher.h"
@@ -50,7 +50,7 @@ class Tracker::Implementation {
   bool accept(const cv::Mat& image, double stamp_s, TrackedFrame* frame);
   void start(const cv::Mat& image, TrackedFrame* frame);
   bool startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame);
-  void adjustStart(TrackedFrame* frame);
+  bool initialise(const cv::Mat& image, TrackedFrame* frame);
   void follow(const cv::Mat& image, TrackedFrame* frame);
   void predict(double interval_s);
   void measure(const cv::Mat& image);
@@ -84,7 +84,7 @@ class Tracker::Implementation {
   TrackerOptions options_;
   Ekf filter_;
   MatchNoise match_noise_;
-  StartAdjustment start_adjustment_;
+  Initialiser initialiser_;
   FeatureMap map_;
   ImageFeatureSearch search_, second_search_;
   Relocaliser relocaliser_;

@@ -38,7 +38,7 @@ void Tracker::Implementation::lose(const std::string& reason) {
   lost_stamp_s_ = last_stamp_s_;
   poor_frames_ = 0;
   ++times_lost_;
-  start_adjustment_.end();
+  initialiser_.end();
   CameraState camera = filter_.camera();
   camera.velocity_world.setZero();
   camera.angular_velocity_camera.setZero();
@@ -85,7 +85,7 @@ bool Tracker::Implementation::findInMap(const cv::Mat& image, TrackedFrame* fram
   state_ = TrackingState::kTracking;
   reason_.clear();
   poor_frames_ = 0;
-  start_adjustment_.end();
+  initialiser_.end();
   return true;
 }
 
@@ -120,7 +120,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   map_.clear();
   for (const MapFeature& feature : content.map) map_.add(feature);
   scale_source_ = static_cast<ScaleSource>(content.scale_source);
-  start_adjustment_.end();
+  initialiser_.end();
   structure_.clear();
   structure_snapshot_ = {};
   state_ = TrackingState::kLost;

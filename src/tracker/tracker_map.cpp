@@ -107,6 +107,8 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
                                        point.w() * T_camera_world.translation());
     if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
   }
+  const auto& fixed = initialiser_.imageFixedPixels();
+  occupied.insert(occupied.end(), fixed.begin(), fixed.end());
   const std::vector<DepthSample> known_depths = knownDepths();
   const double relative_sigma =
       options_.filter.initial_sigma_inverse_depth / options_.filter.initial_inverse_depth;
@@ -129,7 +131,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
     map_.add(std::move(feature));
     ++started;
   }
-  start_adjustment_.addFirstSights(first_sights);
+  initialiser_.addFirstSights(first_sights);
   return started;
 }
 

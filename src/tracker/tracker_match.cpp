@@ -174,7 +174,7 @@ double Tracker::Implementation::expectedOf(const MatchStatistics& s) const {
 /// Whether as many matches agree by accident, among all that were met. In the first images depths
 /// are so vague that matches leave each other most of their gates: only very few count for nothing.
 bool Tracker::Implementation::isByChance(const MatchResult& result, double expected) const {
-  if (start_adjustment_.areDepthsVague()) return result.statistics.matched < kLeastShare * expected;
+  if (initialiser_.isFirstInSight()) return result.statistics.matched < kLeastShare * expected;
   if (result.statistics.matched >= kMajority * expectedOf(result.statistics)) return false;
   std::vector<int> matches, accepted;
   for (int i = 0; i < prior_.size(); ++i) {
@@ -254,7 +254,7 @@ void Tracker::Implementation::match(const cv::Mat& image, TrackedFrame* frame) {
 /// Learns from what the matches fused miss of the map as it is now how noisy they are. Where the
 /// state has followed nearly all of a match, what is left tells nothing.
 void Tracker::Implementation::learnNoise(const UpdateReport& report) {
-  if (start_adjustment_.areDepthsGuessed()) return;
+  if (initialiser_.areDepthsGuessed()) return;
   const Eigen::Vector2d unknown =
       Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   std::vector<Eigen::Vector2d> residuals_px;
@@ -308,7 +308,7 @@ void Tracker::Implementation::correct(const cv::Mat& image, TrackedFrame* frame)
     const MapFeature& feature = *map_.find(match.id);
     match.sigma_px = match_noise_.sigma_px(options_.filter, feature.noise);
     match.lasting = match_noise_.lastingLikeMost(feature.noise);
-    if (start_adjustment_.adjusts(match.id)) {
+    if (initialiser_.isAdjusting(match.id)) {
       match.repetitions = kLearntByAdjustment;
       match.sigma_px *= kNoiseWhileAdjusted;
     } else if (!feature.known) {  // it lies where it was said to, whatever its first images showed
