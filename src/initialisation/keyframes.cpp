@@ -25,9 +25,9 @@ std::size_t commonPoints(const Keyframe& a, const Keyframe& b) {
   return matchMotions(a.measurements, b.measurements).size();
 }
 
-/// See Keyframes::parallax(). Empty when the two share too few points.
-std::optional<double> parallaxBetween(const CameraModel& model, const Keyframe& from,
-                                      const Keyframe& to, std::size_t minimum_points) {
+/// Two keyframes as a bundle of those points of `to` that `from` shows, at infinity, with the
+/// rotation between the two.
+Bundle rotationBetween(const CameraModel& model, const Keyframe& from, const Keyframe& to) {
   Bundle pair;
   pair.cameras.resize(2);
   pair.observations.resize(2);
@@ -40,8 +40,15 @@ std::optional<double> parallaxBetween(const CameraModel& model, const Keyframe& 
     pair.observations[1].push_back({static_cast<int>(pair.features.size()), m.pixel});
     pair.features.push_back(feature);
   }
-  if (pair.features.size() < minimum_points) return std::nullopt;
   alignRotation(model, 1, &pair);
+  return pair;
+}
+
+/// See Keyframes::parallax(). Empty when the two share too few points.
+std::optional<double> parallaxBetween(const CameraModel& model, const Keyframe& from,
+                                      const Keyframe& to, std::size_t minimum_points) {
+  const Bundle pair = rotationBetween(model, from, to);
+  if (pair.features.size() < minimum_points) return std::nullopt;
   const Eigen::Matrix3d R = pair.cameras[1].q_world_camera.toRotationMatrix();
   std::vector<double> angles;
   for (const BundleObservation& o : pair.observations[1])
@@ -124,6 +131,9 @@ bool Keyframes::add(const CameraModel& model, KeyframeMeasurements image,
     Eigen::Vector2d& there = before.velocities_px_s[same - before.measurements.data()];
     there = there.isZero(0.0) ? velocity : Eigen::Vector2d(0.5 * (there + velocity));
   }
+  keyframe.q_rotation_only =
+      (before.q_rotation_only * rotationBetween(model, before, keyframe).cameras[1].q_world_camera)
+          .normalized();
   keyframes_.push_back(std::move(keyframe));
   cull(model);
   return true;
@@ -255,7 +265,7 @@ Hypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector
 }
 
 std::optional<Hypothesis> Keyframes::rotationOnly(const CameraModel& model,
-                                                  const std::set<FeatureId>& without) {
+                                                  const std::set<FeatureId>& without) const {
   const int last = size() - 1, count = static_cast<int>(options_.candidate_keyframes);
   const int step = std::max(1, (last + count - 2) / (count - 1));
   std::vector<int> chosen;
@@ -267,13 +277,8 @@ std::optional<Hypothesis> Keyframes::rotationOnly(const CameraModel& model,
   std::vector<bool> is_known(bundle.features.size());
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     CameraState& camera = bundle.cameras[k];
-    Keyframe& keyframe = keyframes_[chosen[k]];
-    if (k == 0) {
-      camera.q_world_camera = keyframe.q_rotation_only;
-    } else {
-      alignToKnown(model, static_cast<int>(k), is_known, &bundle);
-      keyframe.q_rotation_only = camera.q_world_camera;
-    }
+    camera.q_world_camera = keyframes_[chosen[k]].q_rotation_only;
+    if (k > 0) alignToKnown(model, static_cast<int>(k), is_known, &bundle);
     for (const BundleObservation& o : bundle.observations[k]) {
       const auto ray = model.unproject(o.pixel);
       if (is_known[o.feature] || !ray) continue;

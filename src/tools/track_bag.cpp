@@ -16,6 +16,7 @@
 
 #include "active_matching_slam/evaluation/run_report.h"
 #include "active_matching_slam/evaluation/run_sequence.h"
+#include "active_matching_slam/ros/node_options.h"
 #include "active_matching_slam/tracker/tracker.h"
 #include "active_matching_slam/visualisation/debug_image.h"
 #include "camera_bag_writer.h"

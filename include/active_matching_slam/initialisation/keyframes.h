@@ -69,7 +69,7 @@ class Keyframes {
   /// Few keyframes as if the camera had only rotated; the rotations are kept. Empty when they do
   /// not hang together.
   std::optional<Hypothesis> rotationOnly(const CameraModel& model,
-                                         const std::set<FeatureId>& without);
+                                         const std::set<FeatureId>& without) const;
   /// All keyframes: cameras and features of `known` where it has them, other cameras by constant
   /// velocity, other features at the median depth. Empty when they do not hang together.
   std::optional<Hypothesis> extend(const CameraModel& model, const Hypothesis& known) const;
