@@ -15,6 +15,9 @@ namespace {
 constexpr double kMinimumDamping = 1e-9, kMaximumDamping = 1e8;  ///< numerical guards
 /// Winsorising of features' errors [of the median]: what is beyond three is no noise.
 constexpr double kOutlyingFeature = 3.0;
+/// Points that the prior of an image's relative variance, 1, counts for: about as many as determine
+/// its pose and check it.
+constexpr double kPriorPoints = 10.0;
 
 /// Solves for the Levenberg-Marquardt step. False when not positive definite.
 bool solveStep(const NormalEquations& N, double damping, Eigen::VectorXd* cameras,
@@ -154,7 +157,7 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
 
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle) {
   std::vector<double> sums(bundle.features.size(), 0.0), counts(bundle.features.size(), 0.0);
-  forEachResidual(model, bundle, [&](const BundleObservation& o, double squared_px2) {
+  forEachResidual(model, bundle, [&](std::size_t, const BundleObservation& o, double squared_px2) {
     if (!std::isfinite(squared_px2)) return;
     sums[o.feature] += 0.5 * squared_px2;
     counts[o.feature] += 1.0;
@@ -179,6 +182,25 @@ double estimateSigma(const CameraModel& model, const Bundle& bundle) {
   double squares = 0.0;
   for (const double error_px : errors_px) squares += std::pow(std::min(error_px, limit_px), 2);
   return std::sqrt(squares / features * equations / freedom);
+}
+
+void weighImages(const CameraModel& model, Bundle* bundle) {
+  const double limit_px = kOutlyingFeature * medianOf(featureErrors(model, *bundle));
+  std::vector<double> squares(bundle->cameras.size(), 0.0);
+  forEachResidual(model, *bundle, [&](std::size_t k, const BundleObservation&, double squared_px2) {
+    squares[k] += std::min(0.5 * squared_px2, limit_px * limit_px);
+  });
+  std::vector<double> variances;
+  for (std::size_t k = 1; k < squares.size(); ++k)
+    variances.push_back(squares[k] / static_cast<double>(bundle->observations[k].size()));
+  const double median = medianOf(variances);
+  if (!(median > 0.0)) return;
+  for (std::size_t k = 1; k < squares.size(); ++k) {
+    const double points = static_cast<double>(bundle->observations[k].size());
+    const double sigma =
+        std::sqrt((kPriorPoints + points * variances[k - 1] / median) / (kPriorPoints + points));
+    for (BundleObservation& o : bundle->observations[k]) o.relative_sigma *= sigma;
+  }
 }
 
 void alignRotation(const CameraModel& model, int index, Bundle* bundle) {

@@ -91,7 +91,7 @@ double bundleCost(const CameraModel& model, const BundleOptions& options, const 
   double cost =
       depthCost(options, bundle) +
       bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
-  forEachResidual(model, bundle, [&](const BundleObservation&, double squared_px2) {
+  forEachResidual(model, bundle, [&](std::size_t, const BundleObservation&, double squared_px2) {
     cost += std::isfinite(squared_px2) ? robustCost(options, squared_px2) : kCostOfInvisible;
   });
   return cost;

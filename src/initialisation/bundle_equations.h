@@ -58,8 +58,8 @@ inline Eigen::Vector2d correctedPixel(const Bundle& bundle, const BundleObservat
   return o.pixel - o.d_calibration * bundle.calibration;
 }
 
-/// Calls visit(observation, whitenedSquare) for all image points; infinite where the feature does
-/// not project.
+/// Calls visit(image, observation, whitenedSquare) for all image points; infinite where the feature
+/// does not project.
 template <typename Visit>
 void forEachResidual(const CameraModel& model, const Bundle& bundle, const Visit& visit) {
   for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
@@ -69,8 +69,9 @@ void forEachResidual(const CameraModel& model, const Bundle& bundle, const Visit
       const FeatureState& feature = bundle.features[o.feature];
       const auto pixel = model.project(
           R_camera_world * (feature.bearing_world - feature.inverse_depth * camera.position_world));
-      visit(o, pixel ? whitenedSquare(o, correctedPixel(bundle, o) - *pixel)
-                     : std::numeric_limits<double>::infinity());
+      visit(k, o,
+            pixel ? whitenedSquare(o, correctedPixel(bundle, o) - *pixel)
+                  : std::numeric_limits<double>::infinity());
     }
   }
 }

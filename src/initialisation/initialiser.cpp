@@ -129,6 +129,8 @@ std::optional<InitialState> Initialiser::refine(const CameraModel& model, const 
     return std::nullopt;
   }
   adjusting_images_ = 0;
+  weighImages(model, &extended->bundle);
+  adjustBundle(model, options, &extended->bundle);
   return commit(model, filter, options, *std::move(extended));
 }
 
