@@ -78,7 +78,7 @@ std::optional<InitialState> Initialiser::step(const CameraModel& model, const Ek
     return std::nullopt;
   if (state_ == InitialiserState::kRefining) return refine(model, filter);
   disambiguate(model, filter);
-  return std::nullopt;
+  return state_ == InitialiserState::kRefining ? refine(model, filter) : std::nullopt;
 }
 
 void Initialiser::disambiguate(const CameraModel& model, const Ekf& filter) {
@@ -121,7 +121,7 @@ std::optional<InitialState> Initialiser::refine(const CameraModel& model, const 
   }
   BundleOptions options = bundleOptions(filter.options());
   options.sigma_px = sigma_px_;
-  options.max_iterations = options_.iterations_per_image;
+  options.max_iterations = std::max(2, options_.keyframe_iterations / keyframes_.size());
   const BundleFit fit = adjustBundle(model, options, &extended->bundle);
   if (!fit.converged && adjusting_images_ < options_.images_per_adjustment) {
     ++adjusting_images_;
@@ -137,8 +137,7 @@ std::optional<InitialState> Initialiser::refine(const CameraModel& model, const 
 std::optional<InitialState> Initialiser::commit(const CameraModel& model, const Ekf& filter,
                                                 const BundleOptions& options, Hypothesis adjusted) {
   BundleOptions by_noise = options;
-  by_noise.sigma_px = std::clamp(estimateSigma(model, adjusted.bundle), options.minimum_sigma_px,
-                                 filter.options().sigma_px);
+  by_noise.sigma_px = std::max(estimateSigma(model, adjusted.bundle), options.minimum_sigma_px);
   dropOutliers(model, by_noise, &adjusted);
   matchScale(filter, committed_.empty(), &adjusted);
   const auto& keyframes = keyframes_.all();

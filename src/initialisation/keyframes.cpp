@@ -232,8 +232,18 @@ bool Keyframes::isConnected(const Bundle& bundle) const {
 Hypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector<int>& chosen,
                                      const std::set<FeatureId>& without) const {
   std::map<FeatureId, int> sightings;
-  for (const int k : chosen)
-    for (const FeatureMeasurement& m : keyframes_[k].measurements) ++sightings[m.id];
+  // Of a feature's noise its last match says most; of an image's as a whole nothing is assumed
+  // here: weighImages().
+  std::map<FeatureId, double> relative_sigmas;
+  for (const int k : chosen) {
+    std::vector<double> sigmas_px;
+    for (const FeatureMeasurement& m : keyframes_[k].measurements) sigmas_px.push_back(m.sigma_px);
+    const double median_px = medianOf(std::move(sigmas_px));
+    for (const FeatureMeasurement& m : keyframes_[k].measurements) {
+      ++sightings[m.id];
+      if (m.sigma_px > 0.0 && median_px > 0.0) relative_sigmas[m.id] = m.sigma_px / median_px;
+    }
+  }
   Hypothesis hypothesis;
   for (const auto& [id, count] : sightings)
     if (count >= options_.minimum_sightings && without.count(id) == 0) hypothesis.ids.push_back(id);
@@ -244,17 +254,13 @@ Hypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector
     const Keyframe& keyframe = keyframes_[k];
     hypothesis.images.push_back(keyframe.image);
     bundle.observations.emplace_back();
-    std::vector<double> sigmas_px;
-    for (const FeatureMeasurement& m : keyframe.measurements) sigmas_px.push_back(m.sigma_px);
-    const double median_sigma_px = medianOf(std::move(sigmas_px));
     for (std::size_t i = 0; i < keyframe.measurements.size(); ++i) {
       const FeatureMeasurement& m = keyframe.measurements[i];
       const auto it = std::lower_bound(hypothesis.ids.begin(), hypothesis.ids.end(), m.id);
       if (it == hypothesis.ids.end() || *it != m.id) continue;
       BundleObservation o{static_cast<int>(it - hypothesis.ids.begin()), m.pixel};
-      // Of the image as a whole nothing is assumed: weighImages().
-      if (m.sigma_px > 0.0 && median_sigma_px > 0.0)
-        o.relative_sigma = m.sigma_px / median_sigma_px;
+      if (const auto sigma = relative_sigmas.find(m.id); sigma != relative_sigmas.end())
+        o.relative_sigma = sigma->second;
       o.inverse_shape = m.noise_shape.inverse();
       o.d_calibration << rowShare(model, m.pixel.y()) * keyframe.velocities_px_s[i],
           model.pixelByCorrection(m.pixel);

@@ -41,9 +41,9 @@ struct InitialiserOptions {
   /// Matches of the second image, of the points of the first, below which the first has nothing to
   /// do with it.
   double unrelated_fraction = 0.5;
-  /// Cost: Levenberg-Marquardt iterations an image over all keyframes, and images that may take
-  /// part in one adjustment.
-  int iterations_per_image = 4, images_per_adjustment = 3;
+  /// Cost: Levenberg-Marquardt iterations an image, times keyframes, and images that one adjustment
+  /// may take.
+  int keyframe_iterations = 80, images_per_adjustment = 3;
 };
 
 }  // namespace active_matching_slam
