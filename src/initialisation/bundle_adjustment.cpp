@@ -116,6 +116,7 @@ BundleFit adjustBundle(const CameraModel& model, const BundleOptions& options, B
 
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera, double variance_inflation,
+                                 const Eigen::VectorXd& scale_weights,
                                  double relative_scale_sigma) {
   BundleOptions inflated = options;
   inflated.sigma_px *= std::sqrt(variance_inflation);
@@ -141,18 +142,23 @@ Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& 
   for (int i = 0; i < F; ++i)
     covariance.block<3, 3>(kept + 3 * i, kept + 3 * i) +=
         reduced->inverse_roots[i].transpose() * reduced->inverse_roots[i];
-  // The gauge is one more measurement, of d(log scale) = sum rho_i d rho_i / sum rho_i^2.
+  // The gauge is one more measurement.
   Eigen::VectorXd gauge = Eigen::VectorXd::Zero(M.rows());
-  double squares = 0.0;
-  for (int i = 0; i < F; ++i) {
-    gauge[kept + 3 * i + 2] = bundle.features[i].inverse_depth;
-    squares += std::pow(bundle.features[i].inverse_depth, 2);
-  }
-  gauge /= squares;
+  for (int i = 0; i < F; ++i)
+    gauge[kept + 3 * i + 2] = scale_weights[i] / bundle.features[i].inverse_depth;
   const Eigen::VectorXd along = lower * gauge;
   lower.rankUpdate(along, -1.0 / (relative_scale_sigma * relative_scale_sigma + gauge.dot(along)));
   covariance.triangularView<Eigen::StrictlyUpper>() = covariance.transpose();
   return covariance;
+}
+
+Eigen::VectorXd depthInformation(const CameraModel& model, const BundleOptions& options,
+                                 const Bundle& bundle) {
+  const NormalEquations N = linearise(model, options, bundle);
+  Eigen::VectorXd information(N.features.size());
+  for (Eigen::Index i = 0; i < information.size(); ++i)
+    information[i] = std::pow(bundle.features[i].inverse_depth, 2) / N.features[i].inverse()(2, 2);
+  return information;
 }
 
 std::vector<double> featureErrors(const CameraModel& model, const Bundle& bundle) {

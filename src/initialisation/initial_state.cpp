@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
-#include "active_matching_slam/math/quantile.h"
 #include "active_matching_slam/math/rotation.h"
 
 namespace active_matching_slam {
@@ -47,14 +45,17 @@ CameraJacobian lastCameraJacobian(const CameraState& camera, double interval_s) 
 std::optional<InitialState> makeInitialState(const CameraModel& model, const Ekf& filter,
                                              const BundleOptions& options,
                                              double correlation_inflation,
-                                             const Hypothesis& hypothesis, double interval_s) {
+                                             const Hypothesis& hypothesis,
+                                             const Eigen::VectorXd& scale_weights,
+                                             double interval_s) {
   const Bundle& bundle = hypothesis.bundle;
   BundleOptions with_lens = options;
   with_lens.sigma_calibration = calibrationSigmas(filter.options());
   const int before_last = static_cast<int>(bundle.cameras.size()) - 2;
   if (before_last < 1 || !(interval_s > 0.0)) return std::nullopt;
-  const Eigen::MatrixXd joint = bundleCovariance(model, with_lens, bundle, before_last,
-                                                 correlation_inflation, Ekf::kFreeScaleSigma);
+  const Eigen::MatrixXd joint =
+      bundleCovariance(model, with_lens, bundle, before_last, correlation_inflation, scale_weights,
+                       Ekf::kFreeScaleSigma);
   if (joint.size() == 0 || !joint.allFinite()) return std::nullopt;
 
   InitialState state;
@@ -87,23 +88,6 @@ std::optional<InitialState> makeInitialState(const CameraModel& model, const Ekf
   state.covariance.diagonal().segment<3>(CameraError::kAngularVelocity).array() +=
       std::pow(noise.sigma_angular_acceleration_rps2 * interval_s, 2);
   return state;
-}
-
-void matchScale(const Ekf& filter, bool is_first, Hypothesis* hypothesis) {
-  std::vector<double> before, now;
-  double products = 0.0, squares = 0.0;
-  for (std::size_t i = 0; i < hypothesis->ids.size(); ++i) {
-    const FeatureState* feature = filter.find(hypothesis->ids[i]);
-    if (feature == nullptr) continue;
-    const Eigen::Vector4d point = homogeneousPosition(*feature);
-    before.push_back(point.w() / point.head<3>().norm());
-    now.push_back(hypothesis->bundle.features[i].inverse_depth);
-    products += before.back() * now.back();
-    squares += before.back() * before.back();
-  }
-  const double factor =
-      is_first ? medianOf(std::move(now)) / medianOf(std::move(before)) : products / squares;
-  if (std::isfinite(factor) && factor > 0.0) rescaleBundle(factor, &hypothesis->bundle);
 }
 
 void dropOutliers(const CameraModel& model, const BundleOptions& options, Hypothesis* hypothesis) {

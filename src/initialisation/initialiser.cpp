@@ -47,6 +47,7 @@ void Initialiser::addFirstSights(const std::vector<FeatureMeasurement>& measurem
 
 void Initialiser::rescale(double factor) {
   keyframes_.rescale(factor);
+  scale_.rescale(factor);
   if (accepted_) rescaleBundle(factor, &accepted_->bundle);
 }
 
@@ -139,11 +140,12 @@ std::optional<InitialState> Initialiser::commit(const CameraModel& model, const 
   BundleOptions by_noise = options;
   by_noise.sigma_px = std::max(estimateSigma(model, adjusted.bundle), options.minimum_sigma_px);
   dropOutliers(model, by_noise, &adjusted);
-  matchScale(filter, committed_.empty(), &adjusted);
+  const Eigen::VectorXd scale_weights =
+      scale_.apply(filter, depthInformation(model, by_noise, adjusted.bundle), &adjusted);
   const auto& keyframes = keyframes_.all();
   const double interval_s = keyframes.back().stamp_s - keyframes[keyframes.size() - 2].stamp_s;
   auto state = makeInitialState(model, filter, by_noise, options_.correlation_inflation, adjusted,
-                                interval_s);
+                                scale_weights, interval_s);
   if (!state) return std::nullopt;
   state->is_first = committed_.empty();
   for (std::size_t k = 0; k < keyframes.size(); ++k) {

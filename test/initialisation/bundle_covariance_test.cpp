@@ -120,18 +120,23 @@ Eigen::VectorXd priorInformation(const BundleOptions& options, const Bundle& bun
   return information;
 }
 
-/// How the logarithm of the scale, as the least squares fit of the inverse depths measures it,
-/// follows the parameters.
+/// What holds the scale: near features more than far ones.
+Eigen::VectorXd scaleWeights(const Bundle& bundle) {
+  Eigen::VectorXd weights(bundle.features.size());
+  for (Eigen::Index i = 0; i < weights.size(); ++i)
+    weights[i] = std::pow(bundle.features[i].inverse_depth, 2);
+  return weights / weights.sum();
+}
+
+/// How the mean relative inverse depth follows the parameters.
 Eigen::VectorXd scaleByParameters(const Bundle& bundle) {
   const Layout layout(bundle);
+  const Eigen::VectorXd weights = scaleWeights(bundle);
   Eigen::VectorXd d = Eigen::VectorXd::Zero(layout.size);
-  double squares = 0.0;
-  for (std::size_t i = 0; i < bundle.features.size(); ++i) {
-    const double inverse_depth = bundle.features[i].inverse_depth;
-    d[layout.first_feature + 3 * static_cast<int>(i) + 2] = inverse_depth;
-    squares += inverse_depth * inverse_depth;
-  }
-  return d / squares;
+  for (std::size_t i = 0; i < bundle.features.size(); ++i)
+    d[layout.first_feature + 3 * static_cast<int>(i) + 2] =
+        weights[static_cast<Eigen::Index>(i)] / bundle.features[i].inverse_depth;
+  return d;
 }
 
 TEST(BundleCovariance, IsThatOfThePlainFormula) {
@@ -163,7 +168,7 @@ TEST(BundleCovariance, IsThatOfThePlainFormula) {
   const Precise with_gauge = information + scale * scale.transpose() / (kScaleSigma * kScaleSigma);
   const Eigen::MatrixXd plain = Precise(with_gauge.inverse()).cast<double>();
   const Eigen::MatrixXd covariance =
-      bundleCovariance(model, options, bundle, 2, kInflation, kScaleSigma);
+      bundleCovariance(model, options, bundle, 2, kInflation, scaleWeights(bundle), kScaleSigma);
   const int kept = size - 6;
   ASSERT_EQ(covariance.rows(), kept);
   EXPECT_LT((covariance - plain.bottomRightCorner(kept, kept)).norm(), 1e-6 * plain.norm());
@@ -202,19 +207,19 @@ double meanNees(double correlation, double variance_inflation) {
     options.sigma_px = 0.1;
     adjustBundle(model, options, &bundle);
     options.sigma_px = estimateSigma(model, bundle);
-    double products = 0.0, squares = 0.0;
-    for (std::size_t i = 0; i < bundle.features.size(); ++i) {
-      products += bundle.features[i].inverse_depth * truth.features[i].inverse_depth;
-      squares += std::pow(truth.features[i].inverse_depth, 2);
-    }
-    rescaleBundle(products / squares, &bundle);
+    const Eigen::VectorXd weights = scaleWeights(truth);
+    double factor = 0.0;
+    for (std::size_t i = 0; i < bundle.features.size(); ++i)
+      factor += weights[static_cast<Eigen::Index>(i)] * bundle.features[i].inverse_depth /
+                truth.features[i].inverse_depth;
+    rescaleBundle(factor, &bundle);
     const CameraState &is = bundle.cameras.back(), &was = truth.cameras.back();
     Eigen::Matrix<double, 6, 1> error;
     error << was.position_world - is.position_world,
         vectorFromRotation(was.q_world_camera * is.q_world_camera.conjugate());
     const int last = static_cast<int>(bundle.cameras.size()) - 1;
-    const Eigen::MatrixXd P =
-        bundleCovariance(model, options, bundle, last, variance_inflation, 1e-6);
+    const Eigen::MatrixXd P = bundleCovariance(model, options, bundle, last, variance_inflation,
+                                               scaleWeights(truth), 1e-6);
     nees += error.dot(P.topLeftCorner<6, 6>().inverse() * error) / kDraws;
   }
   return nees;

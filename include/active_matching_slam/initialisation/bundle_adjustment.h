@@ -69,11 +69,15 @@ BundleFit adjustBundle(const CameraModel& model, const BundleOptions& options, B
 /// inverse depth, 3 each): the inverse Fisher information of the image points and priors, with that
 /// of the image points over `variance_inflation`, for errors that are correlated. The lens is a
 /// consider parameter (Schmidt 1966): images teach nothing of it, it is as uncertain as its prior
-/// and makes the rest so. The scale gauge: a change of all lengths, as the least squares fit of the
-/// inverse depths measures it, is known to `relative_scale_sigma`. Empty when singular.
+/// and makes the rest so. The scale gauge: the mean relative change of the inverse depths, by
+/// `scale_weights` (of sum 1), is known to `relative_scale_sigma`. Empty when singular.
 Eigen::MatrixXd bundleCovariance(const CameraModel& model, const BundleOptions& options,
                                  const Bundle& bundle, int first_camera, double variance_inflation,
-                                 double relative_scale_sigma);
+                                 const Eigen::VectorXd& scale_weights, double relative_scale_sigma);
+
+/// Information on the logarithm of each inverse depth if the cameras were known.
+Eigen::VectorXd depthInformation(const CameraModel& model, const BundleOptions& options,
+                                 const Bundle& bundle);
 
 /// Root mean square [px] per axis of the whitened reprojection errors of each feature, times
 /// sigma_px; 0 for one without image points.

@@ -10,6 +10,7 @@
 #include "active_matching_slam/filter/ekf.h"
 #include "active_matching_slam/initialisation/initialiser_options.h"
 #include "active_matching_slam/initialisation/keyframes.h"
+#include "active_matching_slam/initialisation/scale_gauge.h"
 
 namespace active_matching_slam {
 
@@ -94,6 +95,7 @@ class Initialiser {
   InitialiserState state_ = InitialiserState::kDone;
   Keyframes keyframes_;
   std::optional<Hypothesis> accepted_;
+  ScaleGauge scale_;
   std::vector<FeatureId> committed_;  ///< features of the last commit, ascending
   std::vector<Eigen::Vector2d> image_fixed_px_;
   double sigma_px_ = 0.0;       ///< of image points, by the accepted hypothesis
