@@ -32,6 +32,7 @@ void Tracker::Implementation::reset(const std::string& reason) {
   state_ = TrackingState::kWaiting;
   reason_ = reason;
   map_.clear();
+  map_monitor_.reset();
   initialiser_.end();
   structure_.clear();
   structure_snapshot_ = {};
@@ -107,7 +108,7 @@ void Tracker::Implementation::follow(const cv::Mat& image, TrackedFrame* frame) 
   correct(image, frame);
   const bool is_restarted = initialise(image, frame);
   frame->timings_ms.update = stage.lap();
-  if (is_restarted) return;
+  if (is_restarted || giveUpWrongMap(image, frame)) return;
   judge();
   maintainMap(image, frame);
   frame->timings_ms.map = stage.lap();

@@ -10,6 +10,7 @@
 #include "active_matching_slam/information/map_structure.h"
 #include "active_matching_slam/initialisation/initialiser.h"
 #include "active_matching_slam/map/feature_map.h"
+#include "active_matching_slam/map/map_monitor.h"
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/matching/matcher.h"
 #include "active_matching_slam/tracker/tracker.h"
@@ -63,6 +64,7 @@ class Tracker::Implementation {
   void match(const cv::Mat& image, TrackedFrame* frame);
   void learnNoise(const UpdateReport& report);
   void correct(const cv::Mat& image, TrackedFrame* frame);
+  bool giveUpWrongMap(const cv::Mat& image, TrackedFrame* frame);
   void judge();
   void lose(const std::string& reason);
   void relocalise(const cv::Mat& image, TrackedFrame* frame);
@@ -86,6 +88,7 @@ class Tracker::Implementation {
   MatchNoise match_noise_;
   Initialiser initialiser_;
   FeatureMap map_;
+  MapMonitor map_monitor_;
   ImageFeatureSearch search_, second_search_;
   Relocaliser relocaliser_;
   std::unique_ptr<Matcher> matcher_;

@@ -1,6 +1,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "active_matching_slam/image/image_quality.h"
 #include "active_matching_slam/map/map_file.h"
 #include "tracker_implementation.h"
 
@@ -11,6 +12,21 @@ constexpr double kFoundSigmaPosition = 0.2;  ///< of a place found again, in sce
 constexpr double kFoundSigmaRotation = 0.1;  ///< [rad]
 
 }  // namespace
+
+/// Starts anew when the map has turned out wrong.
+bool Tracker::Implementation::giveUpWrongMap(const cv::Mat& image, TrackedFrame* frame) {
+  if (frame->matching.statistics.cut_short) return false;  // not all was looked for
+  map_monitor_.add(last_stamp_s_, prior_.size(), static_cast<int>(fused_.size()),
+                   measureImageQuality(image).sharpness);
+  if (!map_monitor_.isWrong()) return false;
+  const std::string reason =
+      "the map is wrong: half of what it predicts does not match in images as sharp as ever; "
+      "started anew";
+  reset(reason);
+  start(image, frame);
+  frame->reason = reason;
+  return true;
+}
 
 /// Decides whether the camera is still tracked.
 void Tracker::Implementation::judge() {
@@ -38,6 +54,7 @@ void Tracker::Implementation::lose(const std::string& reason) {
   lost_stamp_s_ = last_stamp_s_;
   poor_frames_ = 0;
   ++times_lost_;
+  map_monitor_.reset();
   initialiser_.end();
   CameraState camera = filter_.camera();
   camera.velocity_world.setZero();

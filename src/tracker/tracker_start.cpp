@@ -22,6 +22,7 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
     return;
   }
   map_.clear();
+  map_monitor_.reset();
   if (!options_.known_points.empty()) {
     if (!startFromKnownPoints(image, frame)) return;
   } else {
