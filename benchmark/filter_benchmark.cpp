@@ -1,4 +1,4 @@
-// Cost of the filter's share of a frame, by number of map features and of features measured. Half
+// Cost of the filter in a frame, by number of map features and of features measured. Half
 // of the map are points, half inverse-depth features: the state has 12 + 4.5 features rows.
 
 #include <benchmark/benchmark.h>

@@ -54,9 +54,10 @@ const Sequence& renderedRoom(int width, int height, int rate) {
 class Series {
  public:
   void add(double value) { values_.push_back(value); }
-  double quantile(double share) {
+  double quantile(double fraction) {
     std::sort(values_.begin(), values_.end());
-    return values_.empty() ? 0.0 : values_[static_cast<std::size_t>(share * (values_.size() - 1))];
+    return values_.empty() ? 0.0
+                           : values_[static_cast<std::size_t>(fraction * (values_.size() - 1))];
   }
 
  private:

@@ -1,4 +1,4 @@
-// Cost of a look for the camera in the whole map: where the place is found, and where it is not.
+// Cost of a relocalisation attempt in the whole map: where the place is found, and where it is not.
 // Maps of about 60 and 150 features, 320 x 240 and 640 x 480 pixels.
 
 #include <benchmark/benchmark.h>

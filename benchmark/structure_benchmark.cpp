@@ -1,5 +1,5 @@
 // What the structure of the map costs of a frame (graph of mutual information, tree, submaps), in a
-// simulated room: share_percent of the frame's time, with about 'visible' features in view of which
+// simulated room: frame_percent of the frame's time, with about 'visible' features in view of which
 // 'chosen' at most are measured. Timed is the structure alone.
 
 #include <benchmark/benchmark.h>
@@ -58,7 +58,7 @@ void BM_StructureOfAFrame(benchmark::State& state) {
     mapped += static_cast<double>(frame->features.size());
     ++frames;
   }
-  state.counters["share_percent"] = 100.0 * structure_ms / total_ms;
+  state.counters["frame_percent"] = 100.0 * structure_ms / total_ms;
   state.counters["frame_ms"] = total_ms / frames;
   state.counters["in_map"] = mapped / frames;
   state.counters["measured"] = measured / frames;

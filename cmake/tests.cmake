@@ -24,16 +24,42 @@ foreach(name commands machines rosrun)
     "AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION};AMS_TEST_BAG=${test_bag};AMS_BUILT=${CMAKE_BINARY_DIR}")
 endforeach()
 
+add_test(NAME ${PROJECT_NAME}_compare_runs COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE}
+  ${CMAKE_CURRENT_SOURCE_DIR}/test/tools/compare_runs_test.py)
+set_tests_properties(${PROJECT_NAME}_compare_runs PROPERTIES ENVIRONMENT
+  AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+
 add_test(NAME ${PROJECT_NAME}_house
   COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/include_graph_test.py)
+add_test(NAME ${PROJECT_NAME}_words
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/words_test.py)
+add_test(NAME ${PROJECT_NAME}_constants
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/constants_test.py)
+add_test(NAME ${PROJECT_NAME}_symbols
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/house/symbols_test.py
+    $<TARGET_FILE:${PROJECT_NAME}>)
+
+# The long runs of test_accuracy, in two halves: AMS_ACCURACY=1 ctest -L accuracy
+foreach(half 0 1)
+  set(test ${PROJECT_NAME}_accuracy_${half})
+  add_test(NAME ${test} WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/test
+    COMMAND test_accuracy --gtest_filter=*Long*
+      --gtest_output=xml:${CMAKE_BINARY_DIR}/test_results/${PROJECT_NAME}/${test}.xml)
+  set_tests_properties(${test} PROPERTIES LABELS accuracy TIMEOUT 14400
+    ENVIRONMENT "GTEST_TOTAL_SHARDS=2;GTEST_SHARD_INDEX=${half}"
+    SKIP_REGULAR_EXPRESSION "AMS_ACCURACY is not set")
+endforeach()
 
 get_property(tests DIRECTORY PROPERTY TESTS)
 foreach(test ${tests})
   # As in the node and the tools: results must not depend on the number of cores.
   set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT OPENBLAS_NUM_THREADS=1)
+  if(test MATCHES "_test_accuracy$")
+    set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT GTEST_FILTER=-*Long*)
+  endif()
   if(test MATCHES "_rostest_|_commands$|_machines$")
     set_tests_properties(${test} PROPERTIES RUN_SERIAL TRUE)
-  elseif(test MATCHES "_test_accuracy$")
-    set_tests_properties(${test} PROPERTIES COST 1000)  # the longest begins first
+  elseif(test MATCHES "_accuracy")
+    set_property(TEST ${test} PROPERTY COST 1000)  # the longest begin first
   endif()
 endforeach()

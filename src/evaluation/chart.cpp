@@ -113,8 +113,8 @@ struct Sheet {
                 0.4);
   }
   int row(double unit, bool y_down) const {
-    const double share = y_down ? unit : 1.0 - unit;
-    return panel.y + static_cast<int>(std::lround(share * panel.height));
+    const double fraction = y_down ? unit : 1.0 - unit;
+    return panel.y + static_cast<int>(std::lround(fraction * panel.height));
   }
 
   /// Names on a translucent ground in the upper right corner.

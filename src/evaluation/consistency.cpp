@@ -2,11 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
+
+#include "active_matching_slam/math/chi_square.h"
 
 namespace active_matching_slam {
 
@@ -32,9 +33,9 @@ std::optional<double> normalisedErrorSquared(const Eigen::VectorXd& error,
   return result;
 }
 
-std::optional<double> likeliestUnit(const std::vector<Eigen::Isometry3d>& estimates,
-                                    const std::vector<Eigen::Isometry3d>& truth,
-                                    const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
+std::optional<double> likeliestScale(const std::vector<Eigen::Isometry3d>& estimates,
+                                     const std::vector<Eigen::Isometry3d>& truth,
+                                     const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
   // The error is d + u t, where d is that to a truth at the origin and t the true translation.
   double information = 0.0, weighted = 0.0;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
@@ -50,9 +51,9 @@ std::optional<double> likeliestUnit(const std::vector<Eigen::Isometry3d>& estima
     information += t.dot(Wt);
     weighted -= d.dot(Wt);
   }
-  const double unit = weighted / information;
-  if (!(information > 0.0) || !(unit > 0.0)) return std::nullopt;
-  return unit;
+  const double scale = weighted / information;
+  if (!(information > 0.0) || !(scale > 0.0)) return std::nullopt;
+  return scale;
 }
 
 ChiSquareBounds chiSquareMeanBounds(int degrees, int runs, double confidence) {
@@ -62,10 +63,10 @@ ChiSquareBounds chiSquareMeanBounds(int degrees, int runs, double confidence) {
   if (!(confidence > 0.0 && confidence < 1.0))
     throw std::invalid_argument("chi-square bounds: confidence is " + std::to_string(confidence) +
                                 ", must lie in (0, 1)");
-  const boost::math::chi_squared sum(static_cast<double>(degrees) * runs);
   const double tail = 0.5 * (1.0 - confidence);
-  return {boost::math::quantile(sum, tail) / runs,
-          boost::math::quantile(boost::math::complement(sum, tail)) / runs};
+  const double sum_degrees = static_cast<double>(degrees) * runs;
+  return {chiSquareQuantile(sum_degrees, tail) / runs,
+          chiSquareQuantile(sum_degrees, 1.0 - tail) / runs};
 }
 
 std::vector<double> meanOverRuns(const std::vector<std::vector<double>>& values_of_run) {
@@ -85,7 +86,7 @@ std::vector<double> meanOverRuns(const std::vector<std::vector<double>>& values_
   return mean;
 }
 
-double shareWithin(const std::vector<double>& values, const ChiSquareBounds& bounds) {
+double fractionWithin(const std::vector<double>& values, const ChiSquareBounds& bounds) {
   int within = 0, count = 0;
   for (double value : values) {
     if (!std::isfinite(value)) continue;

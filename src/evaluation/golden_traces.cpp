@@ -10,8 +10,8 @@ MatchOptions traceOptions(UpdateRule rule) {
   MatchOptions options;
   options.update_rule = rule;
   options.keep_trace = true;
-  options.recount = false;
-  options.hearing_weight = 0.0;
+  options.joint_rescoring = false;
+  options.deferred_pruning_weight = 0.0;
   return options;
 }
 

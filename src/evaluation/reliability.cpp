@@ -12,7 +12,7 @@ namespace active_matching_slam {
 namespace {
 
 /// By feature, the ellipses that the accepted hypothesis and its ancestors searched.
-std::vector<std::vector<SearchEllipse>> lineageOf(const MatchResult& result) {
+std::vector<std::vector<SearchEllipse>> ancestryOf(const MatchResult& result) {
   std::map<int, std::size_t> birth;  // of a Gaussian: the step that made it
   std::map<int, int> parent;
   for (std::size_t step = 0; step < result.trace.size(); ++step)
@@ -21,15 +21,15 @@ std::vector<std::vector<SearchEllipse>> lineageOf(const MatchResult& result) {
       parent[entry.gaussian] = entry.parent;
     }
   const MatchHypothesis& accepted = result.hypotheses.front();
-  std::vector<std::vector<SearchEllipse>> lineage(accepted.match_of_feature.size());
+  std::vector<std::vector<SearchEllipse>> ancestry(accepted.match_of_feature.size());
   std::size_t until = result.trace.size();
   for (int id = accepted.gaussian; id >= 0; id = parent[id]) {
     for (std::size_t step = 0; step < until; ++step)
       if (result.trace[step].gaussian == id)
-        lineage[slot(result.trace[step].feature)].push_back(result.trace[step].ellipse);
+        ancestry[slot(result.trace[step].feature)].push_back(result.trace[step].ellipse);
     if (id > 0) until = birth.at(id) + 1;
   }
-  return lineage;
+  return ancestry;
 }
 
 }  // namespace
@@ -37,13 +37,13 @@ std::vector<std::vector<SearchEllipse>> lineageOf(const MatchResult& result) {
 bool claimIsTrue(const SimulatedProblem& problem, const PointListSearch& search,
                  const MatchResult& result) {
   const std::vector<int>& matches = result.hypotheses.front().match_of_feature;
-  const auto lineage = lineageOf(result);
+  const auto ancestry = ancestryOf(result);
   for (int f = 0; f < problem.prior.size(); ++f) {
     const int match = matches[slot(f)], truth = problem.true_point[slot(f)];
     if (match >= 0) {
       if (search.matches(f)[slot(match)].id != truth) return false;
     } else if (truth >= 0) {
-      for (const SearchEllipse& ellipse : lineage[slot(f)])
+      for (const SearchEllipse& ellipse : ancestry[slot(f)])
         if (mahalanobisSquared(ellipse, problem.points[slot(f)][slot(truth)]) <= kEllipseRadius2)
           return false;
     }
@@ -68,7 +68,7 @@ std::vector<ReliabilityBin> Reliability::bins() const {
     bin.frames = count.frames;
     if (count.frames > 0) {
       bin.mean_weight = count.weight / count.frames;
-      bin.share_right = static_cast<double>(count.right) / count.frames;
+      bin.fraction_correct = static_cast<double>(count.right) / count.frames;
       bin.sigma = std::sqrt(std::max(count.variance, 0.0)) / count.frames;
     }
     bins.push_back(bin);

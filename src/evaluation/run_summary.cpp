@@ -40,9 +40,9 @@ std::vector<PosePair> posesOf(const std::vector<std::pair<int, int>>& indices,
   return pairs;
 }
 
-/// `pairs` in the world of the map, in which the filter's covariance is stated. A metric map shares
-/// the truth's world. A free one begins at its first camera, known without error, and its unit of
-/// length is a convention: the likeliest one.
+/// `pairs` in the world of the map, in which the filter's covariance is stated. A metric map has
+/// the truth's world. One of free scale has its gauge fixed at the first camera, known without
+/// error, and the likeliest scale.
 std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, bool metric,
                                  const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
   if (metric || pairs.empty()) return pairs;
@@ -57,8 +57,8 @@ std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, bool metric,
     estimates.push_back(pair.T_world_camera_estimate);
     truth.push_back(pair.T_world_camera_truth);
   }
-  const double unit = likeliestUnit(estimates, truth, covariances).value_or(1.0);
-  for (PosePair& pair : pairs) pair.T_world_camera_truth.translation() *= unit;
+  const double scale = likeliestScale(estimates, truth, covariances).value_or(1.0);
+  for (PosePair& pair : pairs) pair.T_world_camera_truth.translation() *= scale;
   return pairs;
 }
 
@@ -82,7 +82,7 @@ void summariseErrors(const std::vector<FrameRecord>& records, const RunTruth& tr
   double sum = 0.0;
   for (double value : nees) sum += value;
   summary->nees_mean = sum / static_cast<double>(nees.size());
-  summary->nees_share_within = shareWithin(nees, chiSquareMeanBounds(6, 1));
+  summary->nees_fraction_within = fractionWithin(nees, chiSquareMeanBounds(6, 1));
 }
 
 void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summary) {
@@ -122,9 +122,9 @@ Trajectory trackedTrajectory(const std::vector<FrameRecord>& records) {
   return trajectory;
 }
 
-double percentile(std::vector<double> values, double share) {
+double percentile(std::vector<double> values, double fraction) {
   if (values.empty()) return 0.0;
-  const double rank = std::ceil(share * static_cast<double>(values.size()));
+  const double rank = std::ceil(fraction * static_cast<double>(values.size()));
   const std::size_t index =
       std::min(values.size() - 1, static_cast<std::size_t>(std::max(0.0, rank - 1.0)));
   std::nth_element(values.begin(), values.begin() + index, values.end());

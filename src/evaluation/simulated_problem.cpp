@@ -83,7 +83,7 @@ SimulatedProblem ProblemSimulator::next() {
   return problem;
 }
 
-/// All answers of a feature, in random order: itself, its repetitions, and what is only similar.
+/// All responses to a feature, in random order: itself, its copies, and clutter.
 void ProblemSimulator::addClutter(SimulatedProblem& problem, int feature,
                                   const Eigen::Vector2d& truth) {
   const SimulatedProblemOptions& o = options_;
@@ -97,7 +97,7 @@ void ProblemSimulator::addClutter(SimulatedProblem& problem, int feature,
   const SearchEllipse gate{problem.prior.mean(feature), problem.prior.covariance(feature)};
   const double reach_u = 4.0 * std::sqrt(gate.covariance(0, 0));
   const double reach_v = 4.0 * std::sqrt(gate.covariance(1, 1));
-  if (uniform(0.0, 1.0) < o.repeated_share) {
+  if (uniform(0.0, 1.0) < o.repeated_fraction) {
     const int steps_u = static_cast<int>(2.0 * reach_u / o.repeat_px);
     const int steps_v = static_cast<int>(2.0 * reach_v / o.repeat_px);
     for (int i = -steps_u; i <= steps_u; ++i)

@@ -64,8 +64,8 @@ cv::Mat coloured(const cv::Mat& bits, double brightest_bits) {
   cv::Mat scaled(bits.size(), CV_8UC1);
   for (int r = 0; r < bits.rows; ++r) {
     for (int c = 0; c < bits.cols; ++c) {
-      const double share = brightest_bits > 0.0 ? bits.at<double>(r, c) / brightest_bits : 0.0;
-      scaled.at<uchar>(r, c) = cv::saturate_cast<uchar>(255.0 * std::sqrt(std::min(1.0, share)));
+      const double fraction = brightest_bits > 0.0 ? bits.at<double>(r, c) / brightest_bits : 0.0;
+      scaled.at<uchar>(r, c) = cv::saturate_cast<uchar>(255.0 * std::sqrt(std::min(1.0, fraction)));
     }
   }
   cv::Mat picture;
@@ -123,9 +123,9 @@ void drawBitsBar(cv::Mat& picture, cv::Rect place, double brightest_bits) {
   putPlotText(&picture, "bits", {place.x, place.y - 10}, 0.5);
 }
 
-std::string percent(const char* name, double share) {
+std::string percent(const char* name, double fraction) {
   char text[96];
-  std::snprintf(text, sizeof(text), "%s preserves %.1f %%", name, 100.0 * share);
+  std::snprintf(text, sizeof(text), "%s preserves %.1f %%", name, 100.0 * fraction);
   return text;
 }
 

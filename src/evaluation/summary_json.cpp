@@ -26,7 +26,7 @@ std::string summaryJson(const RunSummary& s) {
   json["rpe_m"] = s.rpe ? Json(s.rpe->translation_rmse) : Json(nullptr);
   json["rpe_rad"] = s.rpe ? Json(s.rpe->rotation_rmse_rad) : Json(nullptr);
   json["nees_mean"] = orNull(s.nees_mean);
-  json["nees_share_within_95"] = orNull(s.nees_share_within);
+  json["nees_fraction_within_95"] = orNull(s.nees_fraction_within);
   json["truth_pairs"] = s.truth_pairs;
   json["displacement"] = s.excursion.displacement;
   json["excursion"] = s.excursion.excursion;

@@ -1,10 +1,21 @@
 #include "active_matching_slam/evaluation/trajectory_error.h"
 
-#include <Eigen/SVD>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
 
 namespace active_matching_slam {
+namespace {
+
+/// Whether the positions have a variance beyond rounding.
+bool moves(const Eigen::Matrix3Xd& positions) {
+  const Eigen::Vector3d mean = positions.rowwise().mean();
+  const double variance =
+      (positions.colwise() - mean).squaredNorm() / static_cast<double>(positions.cols());
+  return variance > 1e-24 * (1.0 + mean.squaredNorm());
+}
+
+}  // namespace
 
 Eigen::Isometry3d Alignment::operator()(const Eigen::Isometry3d& T_world_camera_estimate) const {
   Eigen::Isometry3d aligned = Eigen::Isometry3d::Identity();
@@ -15,38 +26,23 @@ Eigen::Isometry3d Alignment::operator()(const Eigen::Isometry3d& T_world_camera_
 
 std::optional<Alignment> align(const std::vector<PosePair>& pairs, AlignmentKind kind) {
   if (pairs.size() < 3) return std::nullopt;
-  const double count = static_cast<double>(pairs.size());
-  Eigen::Vector3d mean_estimate = Eigen::Vector3d::Zero(), mean_truth = Eigen::Vector3d::Zero();
-  for (const PosePair& pair : pairs) {
-    mean_estimate += pair.T_world_camera_estimate.translation() / count;
-    mean_truth += pair.T_world_camera_truth.translation() / count;
+  const auto count = static_cast<Eigen::Index>(pairs.size());
+  Eigen::Matrix3Xd estimate(3, count), truth(3, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const PosePair& pair = pairs[static_cast<std::size_t>(i)];
+    estimate.col(i) = pair.T_world_camera_estimate.translation();
+    truth.col(i) = pair.T_world_camera_truth.translation();
   }
-  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();
-  double variance_estimate = 0.0, variance_truth = 0.0;
-  for (const PosePair& pair : pairs) {
-    const Eigen::Vector3d e = pair.T_world_camera_estimate.translation() - mean_estimate;
-    const Eigen::Vector3d t = pair.T_world_camera_truth.translation() - mean_truth;
-    cross += t * e.transpose() / count;
-    variance_estimate += e.squaredNorm() / count;
-    variance_truth += t.squaredNorm() / count;
-  }
-  if (!cross.allFinite() || !std::isfinite(variance_estimate)) return std::nullopt;
+  if (!estimate.allFinite() || !truth.allFinite()) return std::nullopt;
+  const bool with_scale = kind == AlignmentKind::kSimilarity;
+  if (with_scale && (!moves(estimate) || !moves(truth))) return std::nullopt;
 
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign = Eigen::Vector3d::Ones();
-  // A rotation, never a reflection (Umeyama 1991, eq. 39).
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) sign.z() = -1.0;
+  const Eigen::Matrix4d similarity = Eigen::umeyama(estimate, truth, with_scale);
   Alignment alignment;
-  alignment.rotation_truth_estimate = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  if (kind == AlignmentKind::kSimilarity) {
-    // Below these a spread is rounding.
-    if (!(variance_estimate > 1e-24 * (1.0 + mean_estimate.squaredNorm()))) return std::nullopt;
-    if (!(variance_truth > 1e-24 * (1.0 + mean_truth.squaredNorm()))) return std::nullopt;
-    alignment.scale = svd.singularValues().dot(sign) / variance_estimate;  // eq. 42
-    if (!(alignment.scale > 0.0) || !std::isfinite(alignment.scale)) return std::nullopt;
-  }
-  alignment.translation =
-      mean_truth - alignment.scale * (alignment.rotation_truth_estimate * mean_estimate);
+  if (with_scale) alignment.scale = similarity.block<3, 1>(0, 0).norm();
+  if (!(alignment.scale > 0.0) || !similarity.allFinite()) return std::nullopt;
+  alignment.rotation_truth_estimate = similarity.topLeftCorner<3, 3>() / alignment.scale;
+  alignment.translation = similarity.topRightCorner<3, 1>();
   return alignment;
 }
 

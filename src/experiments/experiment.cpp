@@ -83,7 +83,7 @@ std::string verdictName(Finding::Verdict verdict) {
       return "agrees";
     case Finding::Verdict::kDiffers:
       return "differs";
-    case Finding::Verdict::kUnjudged:
+    case Finding::Verdict::kNoVerdict:
       return "";
   }
   return "";

@@ -25,19 +25,19 @@ ExperimentResult runFastMatching(Workbench& bench) {
   const auto pixels = ratiosByRate(bench, many, "jcbb", "fast_active", pixelsOf);
   result.findings.push_back({text("pixels JCBB : FAM, %d features", many),
                              "significantly fewer at low rates", byRateText(bench, pixels, "%.1f"),
-                             judge(!pixels.empty() && pixels.back() > 2.0)});
+                             verdict(!pixels.empty() && pixels.back() > 2.0)});
   const auto spurious = ratiosByRate(bench, many, "fast_active", "jcbb", spuriousOf);
   result.findings.push_back({text("spurious matches FAM : JCBB, %d features", many), "far fewer",
                              byRateText(bench, spurious, "%.2f"),
-                             judge(!spurious.empty() && spurious.back() < 0.5)});
+                             verdict(!spurious.empty() && spurious.back() < 0.5)});
   const auto to_active = ratiosByRate(bench, many, "fast_active", "active", pixelsOf);
   result.findings.push_back({text("pixels FAM : AM, %d features", many), "more than AM",
                              byRateText(bench, to_active, "%.2f"),
-                             judge(!to_active.empty() && to_active.back() >= 1.0)});
+                             verdict(!to_active.empty() && to_active.back() >= 1.0)});
   const auto time = ratiosByRate(bench, many, "fast_active", "active", totalOf);
   result.findings.push_back(
       {text("time FAM : AM, %d features", many), "far less than AM (0.004 in table 7.1)",
-       byRateText(bench, time, "%.2f"), judge(!time.empty() && time[0] < 0.5), true});
+       byRateText(bench, time, "%.2f"), verdict(!time.empty() && time[0] < 0.5), true});
   return result;
 }
 

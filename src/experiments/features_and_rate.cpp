@@ -43,10 +43,10 @@ ExperimentResult runFeaturesAndRate(Workbench& bench) {
     fewer_spurious += cell.summary.spurious <= jcbb->summary.spurious;
   }
   result.findings.push_back({"cells of the test-bed in which AM searches fewer pixels than JCBB",
-                             "all", text("%d of %d", fewer, cells), judge(fewer == cells)});
+                             "all", text("%d of %d", fewer, cells), verdict(fewer == cells)});
   result.findings.push_back({"... and meets no more spurious matches", "all",
                              text("%d of %d", fewer_spurious, cells),
-                             judge(fewer_spurious == cells)});
+                             verdict(fewer_spurious == cells)});
   std::vector<double> gaps;
   for (const int every : bench.everies()) {
     const auto* jcbb = bench.cell(bench.mainSequence(), 30.0 / every, few, "jcbb");
@@ -59,28 +59,28 @@ ExperimentResult runFeaturesAndRate(Workbench& bench) {
                              byRateText(bench, ratios, "%.1f")});
   result.findings.push_back({text("pixels that AM saves, %d features", few),
                              "the gap widens as the rate falls", byRateText(bench, gaps, "%.0f"),
-                             judge(isRising(gaps))});
+                             verdict(isRising(gaps))});
   std::vector<double> most_gaussians;
   for (const int every : bench.everies())
     if (const auto* cell = bench.cell(bench.mainSequence(), 30.0 / every, few, "active"))
       most_gaussians.push_back(cell->summary.mean_most_gaussians);
   result.findings.push_back({text("Gaussians at most, mean of the frames, %d features", few),
                              "more as the rate falls", byRateText(bench, most_gaussians, "%.1f"),
-                             judge(isRising(most_gaussians))});
+                             verdict(isRising(most_gaussians))});
   const auto* small = bench.cell(bench.mainSequence(), fast_hz, few, "active");
   const auto* large = bench.cell(bench.mainSequence(), fast_hz, most, "active");
   if (small && large) {
     const TrialSummary& s = large->summary;
-    const double share = s.information_ms / s.total_ms;
-    result.findings.push_back({text("share of MI in AM's time, %d features", most),
-                               "the dominating step", text("%.0f %%", 100.0 * share),
-                               judge(share > 0.5), true});
+    const double fraction = s.information_ms / s.total_ms;
+    result.findings.push_back({text("fraction of MI in AM's time, %d features", most),
+                               "the dominating step", text("%.0f %%", 100.0 * fraction),
+                               verdict(fraction > 0.5), true});
     result.findings.push_back(
         {text("AM's time from %d to %d features grows with the power", few, most),
          "scales badly: O(K F^4) to O(K F^5)",
          text("%.1f",
               std::log(s.total_ms / small->summary.total_ms) / std::log(double(most) / few)),
-         Finding::Verdict::kUnjudged, true});
+         Finding::Verdict::kNoVerdict, true});
   }
   return result;
 }

@@ -30,7 +30,7 @@ Histogram gaussian(double mean, double sigma) {
   return histogram;
 }
 
-void look(int pixel, bool is_match, Histogram* histogram) {
+void observe(int pixel, bool is_match, Histogram* histogram) {
   for (int k = 0; k < kPixels; ++k) {
     const double match =
         kFalsePositive + kTruePositive * std::exp(-0.5 * std::pow((pixel - k) / kMatchSigma, 2));
@@ -86,11 +86,11 @@ cv::Mat draw(const std::string& title, const Histogram& prior, const Histogram& 
 ExperimentResult runHistogramSearch(Workbench& /*bench*/) {
   const Histogram prior = gaussian(kMiddle, kPriorSigma);
   Histogram success = prior, failure = prior, between = prior;
-  look(kMiddle, true, &success);
-  look(kMiddle, false, &failure);
-  for (int k = kMiddle - 6; k <= kMiddle + 6; ++k) look(k, answers(k), &between);
+  observe(kMiddle, true, &success);
+  observe(kMiddle, false, &failure);
+  for (int k = kMiddle - 6; k <= kMiddle + 6; ++k) observe(k, answers(k), &between);
   Histogram last = prior;
-  for (int k = 0; k < kPixels; ++k) look(k, answers(k), &last);
+  for (int k = 0; k < kPixels; ++k) observe(k, answers(k), &last);
 
   Table table({"pixel", "prior", "after_match", "after_failure", "between", "final"});
   for (int k = 0; k < kPixels; ++k) {
@@ -121,19 +121,20 @@ ExperimentResult runHistogramSearch(Workbench& /*bench*/) {
   const double ratio_match = success[kMiddle] / prior[kMiddle];
   const double ratio_failure = failure[kMiddle] / prior[kMiddle];
   result.findings.push_back({"a match at the most probable pixel", "a spike",
-                             text("%.1f times as probable", ratio_match), judge(ratio_match > 5)});
+                             text("%.1f times as probable", ratio_match),
+                             verdict(ratio_match > 5)});
   result.findings.push_back({"no match at the most probable pixel", "a trough",
                              text("%.2f times as probable", ratio_failure),
-                             judge(ratio_failure < 0.5)});
+                             verdict(ratio_failure < 0.5)});
   const double both = massNear(last, kMatches[0]) + massNear(last, kMatches[1]);
   result.findings.push_back(
       {"all pixels looked at, two of them match", "two significant candidates",
-       text("%.1f %% of the probability at the two", 100.0 * both), judge(both > 0.9)});
+       text("%.1f %% of the probability at the two", 100.0 * both), verdict(both > 0.9)});
   const double single_bits = bitsLost(last, single), mixture_bits = bitsLost(last, mixture);
   result.findings.push_back({"bits lost by a model of the final distribution",
                              "a mixture of Gaussians represents it well, one Gaussian does not",
                              text("mixture %.2f, one Gaussian %.2f", mixture_bits, single_bits),
-                             judge(mixture_bits < 0.2 * single_bits)});
+                             verdict(mixture_bits < 0.2 * single_bits)});
   return result;
 }
 

@@ -11,7 +11,7 @@ namespace {
 /// Means over frames, by step; a frame that is done counts with nothing.
 struct Evolution {
   std::vector<double> discrete_bits, continuous_bits;
-  double start_bits = 0.0;  ///< sum over the features of what each tells of the others
+  double start_bits = 0.0;  ///< sum over the features of I(z_i; all others)
   int frames = 0;
 
   double total(std::size_t step) const {
@@ -121,15 +121,15 @@ ExperimentResult runInformationSteps(Workbench& bench) {
     starts += text("%s%d: %.0f", i ? "; " : "", counts[i], first_bits[i]);
   result.findings.push_back({"information in the prior by number of features [bits]",
                              "more features, more bits", starts,
-                             judge(std::is_sorted(first_bits.begin(), first_bits.end()))});
+                             verdict(std::is_sorted(first_bits.begin(), first_bits.end()))});
   result.findings.push_back({"steps that expect half of all the bits, most features, fastest rate",
                              "tails off early", text("%zu of %zu", half_time, all_steps),
-                             judge(4 * half_time < all_steps)});
+                             verdict(4 * half_time < all_steps)});
   result.findings.push_back(
       {"discrete information a frame, all sequences, slowest against fastest rate [bits]",
        "appears with ambiguity",
        text("%.2f against %.2f", discrete_at_slowest, discrete_at_fastest),
-       judge(discrete_at_slowest > discrete_at_fastest)});
+       verdict(discrete_at_slowest > discrete_at_fastest)});
   return result;
 }
 

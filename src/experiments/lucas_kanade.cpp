@@ -28,7 +28,7 @@ struct Outcome {
   std::vector<double> error_px;
   Trajectory trajectory;
 
-  void judge(const Eigen::Vector2d& pixel, const Eigen::Vector2d& true_px) {
+  void count(const Eigen::Vector2d& pixel, const Eigen::Vector2d& true_px) {
     if (!true_px.allFinite()) return;
     const double error = (pixel - true_px).norm();
     ++(error <= 3.0 ? right : wrong);
@@ -76,7 +76,7 @@ ReferenceRun trackActively(const Sequence& sequence, int every, TruePlaces* trut
     if (!sequence.isSimulated()) return;
     for (const TrackedFeature& feature : frame.features)
       if (feature.status == FeatureStatus::kMatched)
-        run.outcome.judge(feature.matched_px, truth->pixel(feature.id, image));
+        run.outcome.count(feature.matched_px, truth->pixel(feature.id, image));
   });
   return run;
 }
@@ -150,7 +150,7 @@ Outcome trackByLucasKanade(const Sequence& sequence, const ReferenceRun& referen
       outcome.trajectory.push_back(
           {sequence.stamps_s[static_cast<std::size_t>(image)], T_world_camera});
       if (sequence.isSimulated())
-        for (const auto& [id, pixel] : tracks) outcome.judge(pixel, truth.pixel(id, image));
+        for (const auto& [id, pixel] : tracks) outcome.count(pixel, truth.pixel(id, image));
     }
     addProjected(sequence, reference, image, T_world_camera, &tracks);
   }

@@ -27,7 +27,7 @@ RecordedProblem withSmallTemplates(const RecordedProblem& problem, int size) {
 }
 
 struct Errors {
-  double mean_px = 0.0, median_px = 0.0, wrong_share = 0.0;
+  double mean_px = 0.0, median_px = 0.0, wrong_fraction = 0.0;
   int matches = 0;
 };
 
@@ -38,7 +38,7 @@ Errors errorsOf(std::vector<double> errors_px) {
   std::sort(errors_px.begin(), errors_px.end());
   for (const double error : errors_px) {
     errors.mean_px += error / errors.matches;
-    errors.wrong_share += (error > 3.0 ? 1.0 : 0.0) / errors.matches;
+    errors.wrong_fraction += (error > 3.0 ? 1.0 : 0.0) / errors.matches;
   }
   errors.median_px = errors_px[errors_px.size() / 2];
   return errors;
@@ -50,7 +50,7 @@ ExperimentResult runMatchError(Workbench& bench) {
   const std::vector<std::string> matchers = {"active",      "chow_liu", "fast_active",
                                              "active_live", "jcbb",     "active_search"};
   Table table({"sequence", "rate_hz", "template_px", "matcher", "frames", "matches",
-               "mean_error_px", "median_error_px", "share_beyond_3px"});
+               "mean_error_px", "median_error_px", "fraction_beyond_3px"});
   ExperimentResult result;
   std::vector<cv::Mat> pictures;
   std::array<double, 3> sums{};  // of the mean errors of AM, CLAM and FAM over all cells
@@ -82,7 +82,7 @@ ExperimentResult runMatchError(Workbench& bench) {
         }
         const Errors errors = errorsOf(std::move(errors_px));
         table.add({name, 15.0, size, matchers[m], frames, errors.matches, errors.mean_px,
-                   errors.median_px, errors.wrong_share});
+                   errors.median_px, errors.wrong_fraction});
         if (errors.matches == 0) continue;
         chart.series[m].points.emplace_back(size, errors.mean_px);
         if (m < means.size()) means[m] = errors.mean_px;
@@ -104,18 +104,18 @@ ExperimentResult runMatchError(Workbench& bench) {
       {"match error, mean over sequences and sizes: AM, CLAM, FAM [px]",
        "AM lowest, CLAM close behind, FAM largest",
        text("%.2f, %.2f, %.2f", sums[0] / count, sums[1] / count, sums[2] / count),
-       judge(sums[0] <= sums[1] && sums[1] <= sums[2])});
+       verdict(sums[0] <= sums[1] && sums[1] <= sums[2])});
   result.findings.push_back({"sizes and sequences in which AM has the lowest error of the three",
                              "all", text("%d of %d", active_lowest, cells),
-                             judge(active_lowest == cells)});
+                             verdict(active_lowest == cells)});
   result.findings.push_back({"... and CLAM no larger an error than FAM", "all",
                              text("%d of %d", tree_before_fast, cells),
-                             judge(tree_before_fast == cells)});
+                             verdict(tree_before_fast == cells)});
   result.findings.push_back(
       {"AM's error with the smallest against the largest templates [px]",
        "larger the smaller they are",
        text("%.2f against %.2f", smallest_px / pictures.size(), largest_px / pictures.size()),
-       judge(smallest_px > largest_px)});
+       verdict(smallest_px > largest_px)});
   return result;
 }
 

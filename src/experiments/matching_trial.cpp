@@ -21,14 +21,13 @@ MatchOptions thesisOptions() {
   options.update_rule = UpdateRule::kThesis;
   options.max_gaussians = 25;
   options.default_rates.true_positive = 0.8;
-  options.use_feature_rates = false;
   options.clock_s = threadSeconds;
   return options;
 }
 
 MatchOptions packageOptions() {
   MatchOptions options = liveMatchOptions();
-  options.ambiguous_below_weight = 0.0;  // judged like the others, on what they take for best
+  options.ambiguous_below_weight = 0.0;  // as the others, scored on their best hypothesis
   options.clock_s = threadSeconds;
   return options;
 }

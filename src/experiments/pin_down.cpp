@@ -10,7 +10,7 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kEnoughBits = 1.0;  // pinned down when no feature tells more (page 52)
+constexpr double kEnoughBits = 1.0;  // pinned down when no feature has more information (page 52)
 constexpr double kNoisePx = 1.0;
 
 /// Corners and edges of a rectangle of 160 x 90 px, numbered along its rim.
@@ -125,13 +125,14 @@ ExperimentResult runPinDown(Workbench& /*bench*/) {
                        2));
   const auto steps = [](const Run& run) { return static_cast<int>(run.steps.size()); };
   result.findings.push_back(
-      {"measurements until no feature tells 1 bit", "by efficiency one more than by information",
+      {"measurements until no feature has 1 bit of information",
+       "by efficiency one more than by information",
        text("%d by information, %d by efficiency", steps(by_bits), steps(by_efficiency)),
-       judge(steps(by_efficiency) > steps(by_bits))});
+       verdict(steps(by_efficiency) > steps(by_bits))});
   result.findings.push_back({"area searched", "less by efficiency",
                              text("%.0f px by information, %.0f px by efficiency", by_bits.area_px,
                                   by_efficiency.area_px),
-                             judge(by_efficiency.area_px < by_bits.area_px)});
+                             verdict(by_efficiency.area_px < by_bits.area_px)});
   return result;
 }
 

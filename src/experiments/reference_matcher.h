@@ -25,10 +25,10 @@ std::optional<PnpPose> solvePnp(const CameraModel& camera,
                                 const std::vector<Eigen::Vector3d>& points_world,
                                 const std::vector<Eigen::Vector2d>& pixels, double inlier_px);
 
-/// Where features are in a recording, by other means than those judged (Chli 2009, section 7.6):
-/// dense optical flow from the image before carries that frame's matches over, a pose follows from
-/// them and the positions that the run ended with, and the reference is the best correlation in a
-/// small window around each feature's projection.
+/// Where features are in a recording, by other means than those under test (Chli 2009,
+/// section 7.6): dense optical flow from the image before carries that frame's matches over, a pose
+/// follows from them and the positions that the run ended with, and the reference is the best
+/// correlation in a small window around each feature's projection.
 class ReferenceMatcher {
  public:
   explicit ReferenceMatcher(const Sequence& sequence) : sequence_(sequence) {}

@@ -71,14 +71,14 @@ ExperimentResult runScalableMatching(Workbench& bench) {
   result.findings.push_back({text("pixels CLAM : AM, %d features", most),
                              "somewhat more, the less the faster the rate",
                              byRateText(bench, clam, "%.2f"),
-                             judge(!clam.empty() && clam.front() >= 1.0 && clam.back() < 3.0)});
+                             verdict(!clam.empty() && clam.front() >= 1.0 && clam.back() < 3.0)});
   result.findings.push_back({text("pixels JCBB : CLAM, %d features", most),
-                             "4.6 in figure 7.6 (72777 : 15657, 97 features, rate not told)",
+                             "4.6 in figure 7.6 (72777 : 15657, 97 features, rate not stated)",
                              byRateText(bench, jcbb, "%.1f"),
-                             judge(!jcbb.empty() && jcbb.back() > 2.3)});
+                             verdict(!jcbb.empty() && jcbb.back() > 2.3)});
   result.findings.push_back({text("pixels JCBB : AM, %d features", most),
                              "the gap widens as the rate falls", byRateText(bench, gap, "%.1f"),
-                             judge(isRising(gap))});
+                             verdict(isRising(gap))});
   for (const ThesisRow& row : kThesis)
     if (const auto* cell = bench.cell(bench.mainSequence(), 30.0, most, row.matcher)) {
       const TrialSummary& s = cell->summary;
@@ -88,7 +88,7 @@ ExperimentResult runScalableMatching(Workbench& bench) {
            row.milliseconds,
            text("%.2f / %.2f / %.2f / %.2f / %.2f", s.correlation_ms, s.information_ms, s.update_ms,
                 s.tree_ms, s.total_ms),
-           Finding::Verdict::kUnjudged, true});
+           Finding::Verdict::kNoVerdict, true});
     }
   for (const std::string matcher : {"active_live", "chow_liu_live"}) {
     std::string here;
@@ -99,7 +99,7 @@ ExperimentResult runScalableMatching(Workbench& bench) {
                      cell.summary.total_ms);
     result.findings.push_back({matcher + " with the package's settings, by features [ms]",
                                "AM 25.2 s, CLAM 122 ms (100 features)", here,
-                               Finding::Verdict::kUnjudged, true});
+                               Finding::Verdict::kNoVerdict, true});
   }
   return result;
 }

@@ -52,7 +52,7 @@ ExperimentResult runSubmaps(Workbench& bench) {
       shown_level = static_cast<int>(h);
     }
     result.findings.push_back({text("%s: submaps: naive v Chow-Liu", one.scene), one.thesis, here,
-                               judge(above && !here.empty())});
+                               verdict(above && !here.empty())});
     result.pictures.emplace_back(one.sequence,
                                  informationMatrixPicture(*graph, *submaps, shown_level));
   }

@@ -94,13 +94,13 @@ ExperimentResult runTrackingStep(Workbench& bench) {
     result.findings.push_back(
         {"pixels, JCBB : AM, " + where, row.pixels,
          text("%.0f : %.0f = %.2f", pair->jcbb->pixels, pair->active->pixels, pair->ratio()),
-         judge(pair->ratio() > 0.5 * row.ratio)});
+         verdict(pair->ratio() > 0.5 * row.ratio)});
     result.findings.push_back({"most Gaussians, AM, " + where, std::to_string(row.most_gaussians),
                                std::to_string(pair->active->most_gaussians)});
     result.findings.push_back({"matching alone, JCBB / AM, " + where,
                                "52.4 / 15.6 to 97.1 / 30.4 ms",
                                text("%.2f / %.2f ms", pair->jcbb->total_ms, pair->active->total_ms),
-                               judge(pair->active->total_ms < pair->jcbb->total_ms), true});
+                               verdict(pair->active->total_ms < pair->jcbb->total_ms), true});
   }
   double least = 1e300, largest = 0.0;
   int large_gates = 0, same = 0, frames = 0, jcbb_faults = 0, active_faults = 0;
@@ -121,9 +121,9 @@ ExperimentResult runTrackingStep(Workbench& bench) {
     result.findings.push_back(
         {"pixels, JCBB : AM, where the ellipses are as large as the thesis's (1500 to 9500 px)",
          "6.89 to 8.27", text("%.1f to %.1f (%d sequences and rates)", least, largest, large_gates),
-         judge(least > 0.5 * kThesisLeastRatio)});
+         verdict(least > 0.5 * kThesisLeastRatio)});
   result.findings.push_back({"frames with the same associations by both", "all",
-                             text("%d of %d", same, frames), judge(same == frames)});
+                             text("%d of %d", same, frames), verdict(same == frames)});
   result.findings.push_back({"features wrong or missed, JCBB and AM", "-",
                              text("%d and %d", jcbb_faults, active_faults)});
   return result;

@@ -21,7 +21,7 @@ TrackedRun runMatcher(const Sequence& sequence, const std::string& matcher, int 
   options.matcher = matcher;
   options.matching = matcherVariant(matcher).options;
   // The matcher alone decides, with the same rates for all features (section 7.5.2).
-  options.second_opinion = false;
+  options.fallback_matchers = false;
   options.learn_rates = false;
   TrackedRun run;
   trackSequence(sequence, options, every, [&](const TrackedFrame& frame, int) {
@@ -98,7 +98,7 @@ ExperimentResult runTrajectories(Workbench& bench) {
       const auto add = [&](std::size_t m, const char* thesis, bool agrees) {
         result.findings.push_back({text("%s, %d features, %s, %.4g Hz", matchers[m].c_str(),
                                         counts.back(), name.c_str(), 30.0 / every),
-                                   thesis, resultText(with_most[m]), judge(agrees)});
+                                   thesis, resultText(with_most[m]), verdict(agrees)});
       };
       add(0, is_walkway ? "kept, straight" : "the model trajectory",
           with_most[0].tracked == with_most[0].frames && with_most[0].ate_percent < 10.0);

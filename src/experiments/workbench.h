@@ -65,7 +65,7 @@ Table tableOf(const std::vector<TestBedCell>& cells);
 /// printf into a string.
 std::string text(const char* format, ...) __attribute__((format(printf, 1, 2)));
 
-inline Finding::Verdict judge(bool agrees) {
+inline Finding::Verdict verdict(bool agrees) {
   return agrees ? Finding::Verdict::kAgrees : Finding::Verdict::kDiffers;
 }
 

@@ -76,12 +76,12 @@ Eigen::Matrix<double, 6, 1> Ekf::impulseVariance(const Accelerations& sigmas, do
   return variance;
 }
 
-void Ekf::doubtVelocity(double share) {
+void Ekf::decayVelocity(double fraction) {
   Eigen::Matrix<double, 6, 2> lost = Eigen::Matrix<double, 6, 2>::Zero();
-  lost.topLeftCorner<3, 1>() = (1.0 - share) * camera_.velocity_world;
-  lost.bottomRightCorner<3, 1>() = (1.0 - share) * camera_.angular_velocity_camera;
-  camera_.velocity_world *= share;
-  camera_.angular_velocity_camera *= share;
+  lost.topLeftCorner<3, 1>() = (1.0 - fraction) * camera_.velocity_world;
+  lost.bottomRightCorner<3, 1>() = (1.0 - fraction) * camera_.angular_velocity_camera;
+  camera_.velocity_world *= fraction;
+  camera_.angular_velocity_camera *= fraction;
   covariance_.view().block<6, 6>(CameraError::kVelocity, CameraError::kVelocity) +=
       lost * lost.transpose();
 }

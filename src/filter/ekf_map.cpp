@@ -111,21 +111,18 @@ FeatureId Ekf::addPointFeature(const Eigen::Vector3d& position_world,
   return feature.id;
 }
 
-void Ekf::letCornersWander(const CameraModel& camera, double interval_s,
-                           const std::vector<double>& in_that_of_most) {
-  if (!(interval_s > 0.0) || !std::isfinite(interval_s)) return;
-  const double wander_rad = options_.corner_wander_px / camera.calibration().fx;
+void Ekf::addLandmarkNoise(const CameraModel& camera, double interval_s, double sigma_px) {
+  if (!(interval_s > 0.0) || !std::isfinite(interval_s) || !(sigma_px > 0.0)) return;
+  const double sigma_rad = sigma_px / camera.calibration().fx;
   auto P = covariance_.view();
-  for (std::size_t i = 0; i < features_.size(); ++i) {
-    const FeatureState& feature = features_[i];
+  for (const FeatureState& feature : features_) {
     const Eigen::Vector3d from_camera = feature.position() - camera_.position_world;
     const double distance = from_camera.norm();
     if (!(distance > 0.0)) continue;
     const Eigen::Vector3d ray = from_camera / distance;
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
     const double turned_rad = (across * camera_.velocity_world).norm() * interval_s / distance;
-    const double rad = in_that_of_most.empty() ? wander_rad : in_that_of_most[i] * wander_rad;
-    const double variance = rad * rad * turned_rad;
+    const double variance = sigma_rad * sigma_rad * turned_rad;
     if (feature.kind == FeatureKind::kPoint)
       P.block<3, 3>(feature.offset, feature.offset) += variance * distance * distance * across;
     else

@@ -8,9 +8,10 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kUnitTolerance = 1e-6;  ///< of lengths and angles that must be one or right
-/// Correlations may exceed one by rounding only, which for all but certain rows is measured by the
-/// larger variance.
+/// Of lengths and angles that must be one or right. Derivation: rounding leaves 1e-15.
+constexpr double kUnitTolerance = 1e-6;
+/// Derivation: correlations may exceed one by rounding only, which for all but certain rows is
+/// measured by the larger variance.
 constexpr double kCorrelationTolerance = 1e-3, kRounding = 1e-9;
 
 [[noreturn]] void refuse(const std::string& what) {
@@ -60,7 +61,7 @@ void checkCovariance(const Eigen::MatrixXd& P, int size) {
   if (!(variance.minCoeff() >= 0.0)) refuse("the covariance has a negative variance");
   // Bounds by standard deviations: products of large variances would overflow.
   const Eigen::VectorXd sigma = variance.cwiseSqrt();
-  constexpr int kTile = 32;  // its columns and rows stay in the cache
+  constexpr int kTile = 32;  // Cost: its columns and rows stay in the cache
   using Column = Eigen::Array<double, Eigen::Dynamic, 1, 0, kTile, 1>;
   for (int begin = 0; begin < size; begin += kTile) {
     const int rows = std::min(kTile, size - begin);

@@ -4,12 +4,12 @@
 #include "active_matching_slam/filter/ekf.h"
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/filter/state_error.h"
-#include "measurement_update.h"
+#include "robust_update.h"
 
 namespace active_matching_slam {
 
 PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
-                                               const std::vector<FeatureId>& ids,
+                                               const std::vector<FeatureId>& ids, double sigma_px,
                                                const std::optional<Accelerations>& instead) const {
   PredictedMeasurements predicted;
   const CameraModel lens = camera.corrected(camera_.lens);
@@ -26,7 +26,8 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
   Eigen::MatrixXd PHt(covariance_.size(), stack.rows());
   stack.crossCovariance(covariance_, PHt);
   predicted.S = stack.innovationCovariance(PHt);
-  predicted.S.diagonal().array() += options_.sigma_px * options_.sigma_px;
+  if (!(sigma_px > 0.0)) sigma_px = options_.sigma_px;
+  predicted.S.diagonal().array() += sigma_px * sigma_px;
   for (std::size_t i = 0; i < predicted.ids.size(); ++i) {
     const FeatureState& feature = *find(predicted.ids[i]);
     if (feature.kind != FeatureKind::kInverseDepth) continue;
@@ -45,13 +46,14 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
 }
 
 UpdateReport Ekf::update(const CameraModel& camera,
-                         const std::vector<FeatureMeasurement>& measurements) {
+                         const std::vector<FeatureMeasurement>& measurements,
+                         const NoisePrior& noise) {
   UpdateReport report;
   const CameraModel lens = camera.corrected(camera_.lens);
   std::vector<UsableMeasurement> usable;
   std::vector<std::size_t> given;  // places of those in `measurements`
-  report.noise_left.assign(measurements.size(), 0.0);
-  report.left_px.assign(measurements.size(), Eigen::Vector2d::Zero());
+  report.redundancy.assign(measurements.size(), 0.0);
+  report.residual_px.assign(measurements.size(), Eigen::Vector2d::Zero());
   for (std::size_t i = 0; i < measurements.size(); ++i) {
     const FeatureMeasurement& m = measurements[i];
     const int index = indexOf(m.id);
@@ -60,10 +62,8 @@ UpdateReport Ekf::update(const CameraModel& camera,
       continue;
     if (!projectFeature(lens, camera_, features_[index])) continue;
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
-    const double variance_px2 = sigma_px * sigma_px;
-    usable.push_back({index, m.pixel, variance_px2,
-                      m.repetitions > 1.0 ? (m.repetitions - 1.0) * variance_px2 : 0.0,
-                      m.noise_shape});
+    usable.push_back(
+        {index, m.pixel, sigma_px * sigma_px, std::max(1.0, m.variance_inflation), m.noise_shape});
     given.push_back(i);
   }
   report.skipped = static_cast<int>(measurements.size() - usable.size());
@@ -76,30 +76,26 @@ UpdateReport Ekf::update(const CameraModel& camera,
   Eigen::Map<Eigen::MatrixXd> X(workspace_.data(), n, rows + kGaugeFreedoms);
   ImpulseRoot impulse = ImpulseRoot::Zero();
   if (impulse_) impulse = impulse_->G * impulse_->variance.cwiseSqrt().asDiagonal();
-  MeasurementUpdate correction(camera, camera_, features_, covariance_, usable,
-                               options_.calibration_share, impulse, X.leftCols(rows));
+  RobustUpdate correction(camera, camera_, features_, covariance_, usable, noise, impulse,
+                          X.leftCols(rows));
   if (!correction.solve(options_.update_iterations)) {
     report.healthy = false;
     return report;
   }
   for (std::size_t i = 0; i < given.size(); ++i) {
-    report.noise_left[given[i]] = correction.noiseLeft()[i];
-    report.left_px[given[i]] = correction.leftPx()[i];
+    report.redundancy[given[i]] = correction.redundancy()[i];
+    report.residual_px[given[i]] = correction.residualsPx()[i];
   }
+  report.noise_scale = correction.noiseScale();
+  report.noise_degrees = correction.noiseDegrees();
   const MotionCovariance added = correction.finish();
   impulse_.reset();
   camera_ = correction.camera();
   features_ = correction.features();
   report.nis = correction.nis();
   report.used = static_cast<int>(usable.size());
-  auto calibration =
-      covariance_.view().block<CameraError::kCalibrationSize, CameraError::kCalibrationSize>(
-          CameraError::kReadout, CameraError::kReadout);
-  const auto calibration_before = calibration.eval();
   report.healthy = correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
                                      correction.gaugeCovariance(), added, rows, X);
-  const double not_made = 1.0 - options_.calibration_share;
-  calibration += not_made * not_made * (calibration_before - calibration);
   limitInverseDepths();
   return report;
 }
@@ -137,7 +133,7 @@ bool Ekf::correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
 }
 
 bool Ekf::repairVariances(const Eigen::VectorXd& before) {
-  constexpr double kRounding = 1e-9;
+  constexpr double kRounding = 1e-9;  // Derivation: sums of some hundred terms leave 1e-13
   auto P = covariance_.view();
   bool sound = true;
   for (int i = 0; i < P.rows(); ++i) {

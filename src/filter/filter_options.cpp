@@ -45,7 +45,8 @@ void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("sigma_angular_acceleration_rps2", options.sigma_angular_acceleration_rps2);
   checkPositive("sigma_px", options.sigma_px);
   checkPositive("minimum_sigma_px", options.minimum_sigma_px);
-  checkNotNegative("corner_wander_px", options.corner_wander_px);
+  checkPositive("noise_memory_s", options.noise_memory_s);
+  checkNotNegative("landmark_noise_px", options.landmark_noise_px);
   checkNotNegative("initial_sigma_velocity_mps", options.initial_sigma_velocity_mps);
   checkNotNegative("initial_sigma_angular_velocity_rps",
                    options.initial_sigma_angular_velocity_rps);
@@ -54,8 +55,6 @@ void checkFilterOptions(const FilterOptions& options) {
   checkNotNegative("initial_sigma_radial", options.initial_sigma_radial);
   checkNotNegative("initial_sigma_centre", options.initial_sigma_centre);
   checkPositive("uncalibrated_factor", options.uncalibrated_factor);
-  check(options.calibration_share > 0.0 && options.calibration_share <= 1.0, "calibration_share",
-        options.calibration_share, "(0, 1]");
   checkPositive("initial_inverse_depth", options.initial_inverse_depth);
   checkPositive("initial_sigma_inverse_depth", options.initial_sigma_inverse_depth);
   checkNotNegative("linearity_threshold", options.linearity_threshold);

@@ -76,7 +76,8 @@ Eigen::MatrixXd gaugeGenerators(const CameraState& camera,
 Eigen::MatrixXd gaugeFunctionals(const CameraState& camera,
                                  const std::vector<FeatureState>& features,
                                  const CovarianceMatrix& covariance) {
-  constexpr double kLeastVariance = 1e-8;  // of the relative scale; keeps the weights finite
+  // Of the relative scale. Derivation: no depth is known to 1e-4; weights stay finite.
+  constexpr double kLeastVariance = 1e-8;
   const auto P = covariance.view();
   Eigen::MatrixXd L = Eigen::MatrixXd::Zero(covariance.size(), kGaugeFreedoms);
   L.block<3, 3>(CameraError::kRotation, 0).setIdentity();

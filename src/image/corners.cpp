@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kTensorWindow = 5;  // [px]
 constexpr int kSmallestCell = 32;
-constexpr int kSettlings = 2;        ///< windows looked at for where a corner is steadiest
+constexpr int kRefinements = 2;      ///< iterations of a corner's refinement
 constexpr double kFarthestPx = 3.0;  ///< of that from the corner found
 
 /// A part of the image that may give one corner.
@@ -125,12 +125,12 @@ std::optional<Eigen::Vector2d> steadiestPoint(const cv::Mat& image, const Eigen:
   return middle + shift;
 }
 
-/// The corner's place where the template keeps it best, or the corner's own where that is far off
-/// or not allowed.
-Corner settled(const Corner& corner, const cv::Mat& image, const cv::Rect& area,
+/// The corner moved to where template alignment is least sensitive to warps, or as it was where
+/// that is too far or not allowed.
+Corner refined(const Corner& corner, const cv::Mat& image, const cv::Rect& area,
                const std::vector<Eigen::Vector2d>& occupied, double squared_distance, int size) {
   Corner moved = corner;
-  for (int k = 0; k < kSettlings; ++k) {
+  for (int k = 0; k < kRefinements; ++k) {
     const auto point = steadiestPoint(image, moved.pixel, size);
     if (!point || !((*point - corner.pixel).norm() <= kFarthestPx)) return corner;
     moved.pixel = {std::round(point->x()), std::round(point->y())};
@@ -181,7 +181,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image,
                          static_cast<int>(corner.pixel.y()),
                          options.template_size_px) < options.minimum_contrast)
         continue;
-      corner = settled(corner, image, area, taken, squared_distance, options.template_size_px);
+      corner = refined(corner, image, area, taken, squared_distance, options.template_size_px);
       corners.push_back(corner);
       taken.push_back(corner.pixel);
       if (static_cast<int>(corners.size()) == wanted) return corners;

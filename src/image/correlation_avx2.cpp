@@ -56,10 +56,10 @@ struct Avx2Ops {
     const __m256 one = _mm256_set1_ps(1.0f), minus_one = _mm256_set1_ps(-1.0f);
     for (int i = 0; i < N; i += 8) {
       const __m256 energy = _mm256_loadu_ps(energies + i);
-      const __m256 seen = _mm256_cmp_ps(energy, _mm256_set1_ps(least), _CMP_GE_OQ);
+      const __m256 textured = _mm256_cmp_ps(energy, _mm256_set1_ps(least), _CMP_GE_OQ);
       const __m256 score = _mm256_div_ps(_mm256_loadu_ps(products + i), _mm256_sqrt_ps(energy));
-      _mm256_storeu_ps(scores + i,
-                       _mm256_and_ps(seen, _mm256_max_ps(_mm256_min_ps(score, one), minus_one)));
+      _mm256_storeu_ps(
+          scores + i, _mm256_and_ps(textured, _mm256_max_ps(_mm256_min_ps(score, one), minus_one)));
     }
   }
 };

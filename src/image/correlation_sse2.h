@@ -56,9 +56,10 @@ struct Sse2Ops {
     const __m128 one = _mm_set1_ps(1.0f), minus_one = _mm_set1_ps(-1.0f);
     for (int i = 0; i < N; i += 4) {
       const __m128 energy = _mm_loadu_ps(energies + i);
-      const __m128 seen = _mm_cmpge_ps(energy, _mm_set1_ps(least));
+      const __m128 textured = _mm_cmpge_ps(energy, _mm_set1_ps(least));
       const __m128 score = _mm_div_ps(_mm_loadu_ps(products + i), _mm_sqrt_ps(energy));
-      _mm_storeu_ps(scores + i, _mm_and_ps(seen, _mm_max_ps(_mm_min_ps(score, one), minus_one)));
+      _mm_storeu_ps(scores + i,
+                    _mm_and_ps(textured, _mm_max_ps(_mm_min_ps(score, one), minus_one)));
     }
   }
 };

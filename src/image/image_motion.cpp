@@ -13,8 +13,8 @@ constexpr double kCoarseOfFine = 0.5;  ///< width of the coarse copies, by that 
 constexpr double kSmoothing = 2.0;     ///< standard deviation [px of the copies]
 constexpr double kLeastCorrelation = 0.75;
 constexpr double kSigma = 0.75;  ///< of the result [px of the finest copies]
-/// Of what the correlation lacks to 1: of two alignments at different places one must leave less
-/// than this share of the other's.
+/// Ratio test between two alignments at different places: 1 - correlation of the better one must be
+/// below this fraction of that of the other.
 constexpr double kClearlyBetter = 0.5;
 constexpr double kSamePlaceSigmas = 4.0;
 constexpr int kMostSteps = 30;

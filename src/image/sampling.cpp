@@ -37,9 +37,9 @@ void interpolationWeights(double x, float weights[kTaps]) {
   static const std::vector<float> table = makeTable();
   const double at = x * kSteps;
   const int step = std::clamp(static_cast<int>(at), 0, kSteps - 1);
-  const auto share = static_cast<float>(at - step);
+  const auto fraction = static_cast<float>(at - step);
   const float* from = &table[step * kTaps];
-  for (int k = 0; k < kTaps; ++k) weights[k] = from[k] + share * (from[k + kTaps] - from[k]);
+  for (int k = 0; k < kTaps; ++k) weights[k] = from[k] + fraction * (from[k + kTaps] - from[k]);
 }
 
 }  // namespace active_matching_slam

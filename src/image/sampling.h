@@ -62,7 +62,7 @@ class SampledWindow {
     return true;
   }
 
-  /// The template's row `j`, from its first column on; `-1` and `kStride` lead to its neighbours.
+  /// The template's row `j`, from its first column on; `-1` and `kStride` address its neighbours.
   const float* row(int j) const { return &values_[(j + 1) * kStride + 1]; }
 
  private:

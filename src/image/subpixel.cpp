@@ -15,9 +15,9 @@ constexpr int kStride = SampledWindow::kStride;
 
 int roundedUp(int count) { return (count + 7) / 8 * 8; }
 
-/// Of the noise of a fit, the share that is taken to be alike along both axes, whatever least
-/// squares have: templates are never quite what is seen.
-constexpr double kAlikeShare = 0.25;
+/// Shrinkage of the covariance of a fit towards an isotropic one: least squares assume that the
+/// template differs from the image by noise alone.
+constexpr double kShrinkage = 0.25;
 
 constexpr int kSums = 13;
 
@@ -84,7 +84,7 @@ class NormalEquations {
     const Eigen::Matrix2d shape = left_.inverse().block<2, 2>(1, 1);
     const double mean = 0.5 * shape.trace();
     return {pixel, std::sqrt(left_over * mean) / x[0],
-            (1.0 - kAlikeShare) / mean * shape + kAlikeShare * Eigen::Matrix2d::Identity()};
+            (1.0 - kShrinkage) / mean * shape + kShrinkage * Eigen::Matrix2d::Identity()};
   }
 
  private:

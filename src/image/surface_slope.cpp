@@ -9,11 +9,11 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kLeastParallaxPx = 4.0;  ///< below, a slope hardly shows
+constexpr double kLeastParallaxPx = 4.0;  ///< below, a slope is hardly observable
 constexpr double kGreySigma = 2.0;        ///< of image and template together [grey levels]
-/// Share of an image's information that is believed: the next ones show the same from nearly the
-/// same place, and err alike.
-constexpr double kFreshShare = 0.33;
+/// Weight of an image's information: errors of successive images, taken from nearly the same place,
+/// are correlated.
+constexpr double kInformationWeight = 0.33;
 constexpr double kPriorTangent = 0.9;  ///< sigma, before anything is learnt
 constexpr double kSteepestTangent = 3.0;
 
@@ -54,25 +54,25 @@ bool learnSlope(const cv::Mat& image, const Eigen::Vector2d& pixel, const Templa
   const Normal normal = rows.transpose().lazyProduct(rows);
   const Right right = rows.transpose().lazyProduct(wanted);
 
-  // What is left for the slope once place, gain and offset have taken theirs.
+  // Schur complement: the information about the slope with place, gain and offset eliminated.
   const Eigen::LDLT<Eigen::Matrix4d> rest(normal.topLeftCorner<4, 4>());
   const Eigen::Vector4d pivots = rest.vectorD();
   if (!(pivots.minCoeff() > 1e-6 * pivots.maxCoeff())) return false;
   const Eigen::Matrix<double, 4, 2> eliminated = rest.solve(normal.topRightCorner<4, 2>());
   const double gain = rest.solve(right.head<4>())[0];
   if (!(gain > 0.05)) return false;  // inverted or vanished contrast
-  const double weight = kFreshShare / (kGreySigma * kGreySigma);
+  const double weight = kInformationWeight / (kGreySigma * kGreySigma);
   const Eigen::Matrix2d fresh =
       weight * gain * gain *
       (normal.bottomRightCorner<2, 2>() - normal.bottomLeftCorner<2, 4>() * eliminated);
-  const Eigen::Vector2d pull =
+  const Eigen::Vector2d gradient =
       weight * gain * (right.tail<2>() - eliminated.transpose() * right.head<4>());
 
   Eigen::Matrix2d information = patch->slope_information_px2;
   if (information.isZero(0.0))
     information = view.tangent_metric_px2 / (kPriorTangent * kPriorTangent);
   information += fresh;
-  const Eigen::Vector2d slope = patch->slope_per_px + information.ldlt().solve(pull);
+  const Eigen::Vector2d slope = patch->slope_per_px + information.ldlt().solve(gradient);
   const double tangent2 = slope.dot(view.tangent_metric_px2 * slope);
   if (!information.allFinite() || !(tangent2 <= kSteepestTangent * kSteepestTangent)) return false;
   patch->slope_per_px = slope;

@@ -25,13 +25,13 @@ void checkSquare(const MatrixRef& matrix, const char* name, int divisor = 1) {
 /// Lower Cholesky factor, or empty when the matrix is not finite or has no digits left that show it
 /// positive definite.
 std::optional<MatrixXd> choleskyFactor(const MatrixRef& matrix) {
-  constexpr double kSmallestShare = 1e-14;  // conditional variance over variance
+  constexpr double kSmallestFraction = 1e-14;  // conditional variance over variance
   if (!matrix.allFinite()) return std::nullopt;
   MatrixXd factor = matrix;
   Eigen::LLT<Eigen::Ref<MatrixXd>> llt(factor);
   if (llt.info() != Eigen::Success) return std::nullopt;
   for (Eigen::Index i = 0; i < factor.rows(); ++i) {
-    if (!(factor(i, i) * factor(i, i) > kSmallestShare * matrix(i, i))) return std::nullopt;
+    if (!(factor(i, i) * factor(i, i) > kSmallestFraction * matrix(i, i))) return std::nullopt;
   }
   return factor;
 }

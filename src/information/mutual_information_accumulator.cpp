@@ -51,33 +51,33 @@ void MutualInformationAccumulator::addFrame(const std::vector<std::int64_t>& ids
                                 std::to_string(S.cols()) + ", allowed: " + std::to_string(rows) +
                                 " x " + std::to_string(rows));
   }
-  struct Seen {
+  struct Visible {
     std::int64_t id;
     int index;
     Whitening whitening;
   };
-  std::vector<Seen> seen;
-  seen.reserve(ids.size());
+  std::vector<Visible> visible;
+  visible.reserve(ids.size());
   for (int i : orderById(ids)) {
     const Whitening whitening = Whitening::of(S.block<2, 2>(2 * i, 2 * i));
-    if (whitening.usable) seen.push_back({ids[i], i, whitening});
+    if (whitening.usable) visible.push_back({ids[i], i, whitening});
   }
-  for (std::size_t a = 0; a < seen.size(); ++a) {
-    Partners& partners = features_[seen[a].id];
+  for (std::size_t a = 0; a < visible.size(); ++a) {
+    Partners& partners = features_[visible[a].id];
     std::size_t known = 0;
     Partners added;
-    for (std::size_t b = a + 1; b < seen.size(); ++b) {
+    for (std::size_t b = a + 1; b < visible.size(); ++b) {
       // Columns of the first feature: one contiguous walk down S.
-      const int i = 2 * seen[a].index, k = 2 * seen[b].index;
-      const double odds = dependenceOdds(seen[b].whitening, seen[a].whitening, S(k, i), S(k + 1, i),
-                                         S(k, i + 1), S(k + 1, i + 1));
+      const int i = 2 * visible[a].index, k = 2 * visible[b].index;
+      const double odds = dependenceOdds(visible[b].whitening, visible[a].whitening, S(k, i),
+                                         S(k + 1, i), S(k, i + 1), S(k + 1, i + 1));
       const double bits = std::isfinite(odds) ? oddsToBits(odds) : 0.0;
-      while (known < partners.size() && partners[known].id < seen[b].id) ++known;
-      if (known < partners.size() && partners[known].id == seen[b].id) {
+      while (known < partners.size() && partners[known].id < visible[b].id) ++known;
+      if (known < partners.size() && partners[known].id == visible[b].id) {
         partners[known].sum_bits += bits;
         ++partners[known].frames;
       } else {
-        added.push_back({seen[b].id, bits, 1});
+        added.push_back({visible[b].id, bits, 1});
       }
     }
     if (added.empty()) continue;

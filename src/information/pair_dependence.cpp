@@ -3,12 +3,12 @@
 namespace active_matching_slam {
 
 Whitening Whitening::of(double s00, double s10, double s11) {
-  // Below this share of its variance a coordinate counts as determined by the other one.
-  constexpr double kSmallestShare = 1e-14;
+  // Below this fraction of its variance a coordinate counts as determined by the other one.
+  constexpr double kSmallestFraction = 1e-14;
   Whitening w;
   if (!(std::isfinite(s00) && std::isfinite(s10) && std::isfinite(s11) && s00 > 0.0)) return w;
   const double left = s11 - s10 / s00 * s10;
-  if (!(left > kSmallestShare * s11)) return w;
+  if (!(left > kSmallestFraction * s11)) return w;
   w.a = 1.0 / std::sqrt(s00);
   w.c = 1.0 / std::sqrt(left);
   w.b = -s10 / s00 * w.c;

@@ -39,10 +39,10 @@ SubmapPartition partitionIntoSubmaps(const MutualInformationGraph& graph,
 }
 
 SubmapPartition partitionPreserving(const MutualInformationGraph& graph,
-                                    const SubmapHierarchy& hierarchy, double share) {
+                                    const SubmapHierarchy& hierarchy, double fraction) {
   checkIds(graph, hierarchy);
-  if (!(share >= 0.0 && share <= 1.0)) {
-    throw std::invalid_argument("share is " + std::to_string(share) + ", allowed: 0 to 1");
+  if (!(fraction >= 0.0 && fraction <= 1.0)) {
+    throw std::invalid_argument("fraction is " + std::to_string(fraction) + ", allowed: 0 to 1");
   }
   const std::vector<WeightedEdge> edges = graphEdges(graph);
   DisjointSets sets(static_cast<int>(hierarchy.ids.size()));
@@ -50,7 +50,7 @@ SubmapPartition partitionPreserving(const MutualInformationGraph& graph,
     sets.unite(hierarchy.merges[m].first, hierarchy.merges[m].second);
     if (m + 1 < hierarchy.merges.size() && hierarchy.merges[m + 1].level == 1) continue;
     SubmapPartition partition = partitionOf(sets, edges);
-    if (partition.preserved >= share) return partition;
+    if (partition.preserved >= fraction) return partition;
   }
   // All links lie inside the connected parts, so nothing is lost but by rounding.
   return partitionOf(sets, edges);

@@ -12,11 +12,12 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kMinimumDamping = 1e-9, kMaximumDamping = 1e8;  ///< numerical guards
-/// Winsorising of features' errors [of the median]: what is beyond three is no noise.
+/// Cost: of iterations that can't help any more; damping relative to the diagonal.
+constexpr double kMinimumDamping = 1e-9, kMaximumDamping = 1e8;
+/// Limit to which features' errors are winsorised [median]. Standard: three sigma.
 constexpr double kOutlyingFeature = 3.0;
-/// Points that the prior of an image's relative variance, 1, counts for: about as many as determine
-/// its pose and check it.
+/// Points that the prior of an image's relative variance, 1, counts for. Derivation: five determine
+/// a motion, as many again check it.
 constexpr double kPriorPoints = 10.0;
 
 /// Solves for the Levenberg-Marquardt step. False when not positive definite.
@@ -190,7 +191,7 @@ double estimateSigma(const CameraModel& model, const Bundle& bundle) {
   return std::sqrt(squares / features * equations / freedom);
 }
 
-void weighImages(const CameraModel& model, Bundle* bundle) {
+void estimateImageVariances(const CameraModel& model, Bundle* bundle) {
   const double limit_px = kOutlyingFeature * medianOf(featureErrors(model, *bundle));
   std::vector<double> squares(bundle->cameras.size(), 0.0);
   forEachResidual(model, *bundle, [&](std::size_t k, const BundleObservation&, double squared_px2) {

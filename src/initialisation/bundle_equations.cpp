@@ -8,8 +8,9 @@
 namespace active_matching_slam {
 namespace {
 
-/// Numerical guards: information of every bearing [1/rad^2], so that one that no image shows stays;
-/// standard deviation of what is held; cost of an image point whose feature does not project.
+/// Information of every bearing [1/rad^2], so that one that no image shows stays; standard
+/// deviation of what is held; cost of an image point whose feature does not project. Derivation:
+/// negligible beside a pixel's, and beyond any residual's, in doubles.
 constexpr double kBearingInformation = 1e-2, kHeldSigma = 1e-8, kCostOfInvisible = 1e3;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;

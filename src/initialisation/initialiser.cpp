@@ -130,7 +130,7 @@ std::optional<InitialState> Initialiser::refine(const CameraModel& model, const 
     return std::nullopt;
   }
   adjusting_images_ = 0;
-  weighImages(model, &extended->bundle);
+  estimateImageVariances(model, &extended->bundle);
   adjustBundle(model, options, &extended->bundle);
   return commit(model, filter, options, *std::move(extended));
 }

@@ -13,7 +13,7 @@ namespace active_matching_slam {
 namespace {
 
 /// Of the points, for parallax and motion: where most are as far as each other, the few that are
-/// near show the translation.
+/// near show the translation. Standard: the upper quartile.
 constexpr double kQuantile = 0.75;
 constexpr int kParallaxKeyframes = 6;  ///< Cost: that parallax is measured to
 
@@ -233,7 +233,7 @@ Hypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector
                                      const std::set<FeatureId>& without) const {
   std::map<FeatureId, int> sightings;
   // Of a feature's noise its last match says most; of an image's as a whole nothing is assumed
-  // here: weighImages().
+  // here: estimateImageVariances().
   std::map<FeatureId, double> relative_sigmas;
   for (const int k : chosen) {
     std::vector<double> sigmas_px;

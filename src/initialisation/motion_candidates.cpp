@@ -14,10 +14,12 @@ constexpr int kDirections = 120, kIterations = 4;
 constexpr double kNeighbourCosine = 0.9;
 constexpr std::size_t kMinima = 3;
 /// Sine of the angle to the translation below which an image point has no parallax to speak of.
+/// Derivation: its parallax is this fraction of that of a point abeam, at most.
 constexpr double kMinimumSine = 0.05;
-/// Numerical guard: depths to start from are within this factor of the mean.
+/// Depths to start an adjustment from are within this factor of the mean. Cost: of iterations.
 constexpr double kDepthRatio = 3.0;
-/// 18 degrees between the translations of two candidates that are one.
+/// Cosine between the translations of two candidates that are one: 18 degrees. Derivation: less
+/// than between a lattice's neighbours that may both be minima.
 constexpr double kSameCosine = 0.95;
 
 /// Rays of a feature from the first camera and the last, unit, in the first camera's frame.
@@ -138,13 +140,14 @@ std::vector<Bundle> motionCandidates(const CameraModel& model, const BundleOptio
   for (const Translation& translation : lowestMinima(pairs)) {
     candidates.push_back(candidateOf(translation, model, options, pairs, rotation_only));
     candidates.push_back(candidates.back());
-    reverseDepths(model, &candidates.back());
+    makeBasReliefCounterpart(model, &candidates.back());
   }
   return candidates;
 }
 
-void reverseDepths(const CameraModel& model, Bundle* bundle) {
-  constexpr double kMinimumFraction = 0.1;  // of the mean, that a mirrored inverse depth keeps
+void makeBasReliefCounterpart(const CameraModel& model, Bundle* bundle) {
+  // Of the mean, that a mirrored inverse depth keeps. Cost: of iterations from there.
+  constexpr double kMinimumFraction = 0.1;
   double mean = 0.0;
   for (const FeatureState& feature : bundle->features) mean += feature.inverse_depth;
   mean /= static_cast<double>(std::max<std::size_t>(bundle->features.size(), 1));

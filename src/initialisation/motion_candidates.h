@@ -12,7 +12,7 @@ namespace active_matching_slam {
 /// For each direction of the last camera's translation the small rotation that goes with it
 /// minimises the epipolar errors, without depths (Heeger and Jepson 1992). The few deepest minima
 /// over the sphere of directions are candidates, the lowest first, with the cameras on a line and
-/// depths by the image motion; and the depth reversal of each (reverseDepths()).
+/// depths by the image motion; and the depth reversal of each (makeBasReliefCounterpart()).
 /// `rotation_only`: all cameras at the origin, with the rotations that fit best.
 std::vector<Bundle> motionCandidates(const CameraModel& model, const BundleOptions& options,
                                      const Bundle& rotation_only);
@@ -20,7 +20,7 @@ std::vector<Bundle> motionCandidates(const CameraModel& model, const BundleOptio
 /// The bas-relief counterpart, which a narrow view or little parallax can hardly tell from the
 /// first (Belhumeur et al. 1999): inverse depths mirrored at their mean, the path reversed, rotated
 /// to fit.
-void reverseDepths(const CameraModel& model, Bundle* bundle);
+void makeBasReliefCounterpart(const CameraModel& model, Bundle* bundle);
 
 /// Whether two adjusted candidates have come to the same minimum.
 bool isSameMotion(const Bundle& a, const Bundle& b);

@@ -9,15 +9,29 @@
 namespace active_matching_slam {
 namespace {
 
+/// Cells by which measured features are spread. Derivation: square in an image of 4:3, and about as
+/// many as features are measured in a frame by default.
 constexpr int kGridColumns = 8, kGridRows = 6;
 
+/// Forgetting factor of the recent match rate and of the drift, a search. Derivation: its memory of
+/// 1 / (1 - 0.9) = 10 searches is MapOptions::retire_after_attempts by default.
+constexpr double kForgetting = 0.9;
+/// Matches from which on a feature's drift counts. Derivation: the memory of its average.
+constexpr int kMinimumMatchesForDrift = 10;
+/// Features of which the median drift is taken. Derivation: a median of 8 stands three outliers.
+constexpr std::size_t kMinimumFeaturesForMedian = 8;
+/// Largest drift, in the median of all. Derivation: of errors that are isotropic Gaussian, one in
+/// 2^(3.5^2), about 5000, is longer.
+constexpr double kMaximumRelativeDrift = 3.5;
+/// The same at least, whatever the median [px]: the bias of sub-pixel alignment, which goes by
+/// pixels and not by the image's size. Cost: lower, features that are points are retired and must
+/// be started anew.
+constexpr double kMaximumDriftPx = 0.3;
+/// Matched of the features searched in an image, as a fraction of one, below which the image is at
+/// fault. Derivation: an image that is half occluded, with some misses besides, is not.
+constexpr int kInverseFaultyFraction = 3;
+
 bool byId(const MapFeature& a, FeatureId id) { return a.id < id; }
-
-constexpr double kRateMemory = 0.9;  ///< of the recent rate, a search
-
-constexpr int kLeastMatchesToDrift = 10;
-constexpr std::size_t kLeastFeaturesToCompare = 8;
-constexpr double kMostDrift = 3.5, kMostDriftPx = 0.3;  ///< to the median; and at least
 
 Eigen::Vector2d medianInnovation(const std::vector<SearchRecord>& searches) {
   std::vector<double> x, y;
@@ -29,14 +43,18 @@ Eigen::Vector2d medianInnovation(const std::vector<SearchRecord>& searches) {
   return {medianOf(std::move(x)), medianOf(std::move(y))};
 }
 
-}  // namespace
-
-const MapFeature* FeatureMap::find(FeatureId id) const {
-  const auto it = std::lower_bound(features_.begin(), features_.end(), id, byId);
-  return it != features_.end() && it->id == id ? &*it : nullptr;
+/// The feature among some in the order of their ids, constant or not; null when unknown.
+template <class Features>
+auto findIn(Features& features, FeatureId id) -> decltype(features.data()) {
+  const auto it = std::lower_bound(features.begin(), features.end(), id, byId);
+  return it != features.end() && it->id == id ? &*it : nullptr;
 }
 
-MapFeature* FeatureMap::findMutable(FeatureId id) { return const_cast<MapFeature*>(find(id)); }
+}  // namespace
+
+const MapFeature* FeatureMap::find(FeatureId id) const { return findIn(features_, id); }
+
+MapFeature* FeatureMap::findMutable(FeatureId id) { return findIn(features_, id); }
 
 void FeatureMap::clear() { features_.clear(); }
 
@@ -120,7 +138,8 @@ std::vector<VisibleFeature> FeatureMap::choose(const std::vector<VisibleFeature>
 void FeatureMap::record(const std::vector<SearchRecord>& searches, std::int64_t frame) {
   const auto matched = std::count_if(searches.begin(), searches.end(),
                                      [](const SearchRecord& s) { return s.matched; });
-  const bool image_at_fault = 3 * matched < static_cast<std::ptrdiff_t>(searches.size());
+  const bool image_at_fault =
+      kInverseFaultyFraction * matched < static_cast<std::ptrdiff_t>(searches.size());
   const Eigen::Vector2d common = medianInnovation(searches);
   for (const SearchRecord& search : searches) {
     MapFeature* feature = findMutable(search.id);
@@ -128,12 +147,12 @@ void FeatureMap::record(const std::vector<SearchRecord>& searches, std::int64_t 
     ++feature->attempts;
     feature->rates.add(search.matched, search.matches, search.pixels);
     feature->recent_rate =
-        kRateMemory * feature->recent_rate + (search.matched ? 1.0 - kRateMemory : 0.0);
+        kForgetting * feature->recent_rate + (search.matched ? 1.0 - kForgetting : 0.0);
     if (search.matched) {
       ++feature->successes;
       feature->last_matched_frame = frame;
       feature->drift_px =
-          kRateMemory * feature->drift_px + (1.0 - kRateMemory) * (search.innovation_px - common);
+          kForgetting * feature->drift_px + (1.0 - kForgetting) * (search.innovation_px - common);
     }
   }
 }
@@ -144,12 +163,8 @@ void FeatureMap::learnSlope(const VisibleFeature& feature, const Template& expec
     active_matching_slam::learnSlope(image, pixel, expected, feature.view, &known->patch);
 }
 
-void FeatureMap::seeNoise(FeatureId id, double sigma_px) {
-  if (MapFeature* feature = findMutable(id)) feature->noise.see(sigma_px);
-}
-
-void FeatureMap::learnNoise(FeatureId id, const Eigen::Vector2d& residual_px, double shown_px) {
-  if (MapFeature* feature = findMutable(id)) feature->noise.learn(residual_px, shown_px);
+void FeatureMap::learnNoise(FeatureId id, const Eigen::Vector2d& residual) {
+  if (MapFeature* feature = findMutable(id)) feature->noise.learn(residual);
 }
 
 double FeatureMap::expectedMatches(const std::vector<VisibleFeature>& visible) const {
@@ -171,20 +186,20 @@ std::vector<FeatureId> FeatureMap::failing(const MapOptions& options) const {
 std::vector<FeatureId> FeatureMap::drifting() const {
   std::vector<double> lengths;
   for (const MapFeature& feature : features_)
-    if (feature.successes >= kLeastMatchesToDrift) lengths.push_back(feature.drift_px.norm());
-  if (lengths.size() < kLeastFeaturesToCompare) return {};
-  const double limit = std::max(kMostDrift * medianOf(lengths), kMostDriftPx);
+    if (feature.successes >= kMinimumMatchesForDrift) lengths.push_back(feature.drift_px.norm());
+  if (lengths.size() < kMinimumFeaturesForMedian) return {};
+  const double limit = std::max(kMaximumRelativeDrift * medianOf(lengths), kMaximumDriftPx);
   std::vector<FeatureId> ids;
   for (const MapFeature& feature : features_)
-    if (!feature.known && feature.successes >= kLeastMatchesToDrift &&
+    if (!feature.known && feature.successes >= kMinimumMatchesForDrift &&
         feature.drift_px.norm() > limit)
       ids.push_back(feature.id);
   return ids;
 }
 
-std::vector<FeatureId> FeatureMap::leastInformative(const Ekf& filter, int count) const {
+std::vector<FeatureId> FeatureMap::leastUseful(const Ekf& filter, int count) const {
   struct Entry {
-    double distance;
+    double uselessness;
     FeatureId id;
   };
   std::vector<Entry> entries;
@@ -195,15 +210,15 @@ std::vector<FeatureId> FeatureMap::leastInformative(const Ekf& filter, int count
     const Eigen::Vector4d point = homogeneousPosition(*state);
     const Eigen::Vector3d ray = point.head<3>() - point.w() * T_world_camera.translation();
     const double cosine = ray.normalized().dot(T_world_camera.linear().col(2));
+    const double off_axis_rad = std::acos(std::clamp(cosine, -1.0, 1.0));
     const double baseline =
         (T_world_camera.translation() - feature.patch.T_world_camera.translation()).norm();
     const double inverse_distance = point.w() / std::max(ray.norm(), 1e-12);
-    entries.push_back({std::acos(std::clamp(cosine, -1.0, 1.0)) + baseline * inverse_distance +
-                           (1.0 - feature.recent_rate),
-                       feature.id});
+    const double failure_rate = 1.0 - feature.recent_rate;
+    entries.push_back({off_axis_rad + baseline * inverse_distance + failure_rate, feature.id});
   }
   std::stable_sort(entries.begin(), entries.end(),
-                   [](const Entry& a, const Entry& b) { return a.distance > b.distance; });
+                   [](const Entry& a, const Entry& b) { return a.uselessness > b.uselessness; });
   std::vector<FeatureId> ids;
   for (int i = 0; i < count && i < static_cast<int>(entries.size()); ++i)
     ids.push_back(entries[i].id);

@@ -16,13 +16,23 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kMaximumDistance = 70;  ///< of descriptors [bit of 256]
-constexpr double kRatio = 0.9;        ///< best to second best distance (Lowe 2004)
-constexpr double kSamePlacePx = 6.0;  ///< nearer corners of other scales do not count as second
+/// Largest Hamming distance of descriptors that match [bit of 256]. Cost: wrong pairs below it, and
+/// right ones above, cost RANSAC iterations; the templates decide in the end.
+constexpr int kMaximumDescriptorDistance = 70;
+/// Largest ratio of best to second best distance (Lowe 2004). Cost: as above.
+constexpr double kMaximumDistanceRatio = 0.9;
+/// Distance [px] within which corners of different scales are the same corner, not second best.
+/// Derivation: the corner detector's spacing of 4 px at half scale, less its rounding.
+constexpr double kSameCornerPx = 6.0;
+/// Derivation: a pose takes 3 points, so that the consensus has as many again.
 constexpr int kMinimumSightings = 6;
-constexpr int kRansacIterations = 1000;  ///< find 3 right ones in 10 with 99.9 %
+/// Derivation: (1 - 0.2^3)^1000 < 0.001: three right ones are drawn where 2 in 10 are right.
+constexpr int kRansacIterations = 1000;
+/// Residual of a RANSAC inlier [px]. Cost: coarse, as ORB corners of the smallest scale are.
 constexpr float kRansacPx = 5.0f;
-constexpr double kLargestSlope = 5.0;  ///< of a ray: beyond it, ideal pixels run away
+/// Largest slope of a ray that is used. Derivation: a residual in ideal pixels grows with its
+/// square.
+constexpr double kMaximumSlope = 5.0;
 
 void checkRange(const char* name, double value, double low, double high) {
   if (!(value >= low && value <= high))
@@ -122,12 +132,13 @@ std::vector<Relocaliser::Sighting> Relocaliser::matchDescriptors(
   for (std::size_t k = 0; k < described.size(); ++k) {
     const int* row = distances.ptr<int>(static_cast<int>(k));
     const auto best = std::min_element(row, row + distances.cols) - row;
-    if (row[best] > kMaximumDistance) continue;
+    if (row[best] > kMaximumDescriptorDistance) continue;
     int second = std::numeric_limits<int>::max();
     for (int i = 0; i < distances.cols; ++i)
-      if (row[i] < second && (points.pixels[i] - points.pixels[best]).norm() > kSamePlacePx)
+      if (row[i] < second && (points.pixels[i] - points.pixels[best]).norm() > kSameCornerPx)
         second = row[i];
-    if (row[best] < kRatio * second) sightings.push_back({described[k], points.pixels[best]});
+    if (row[best] < kMaximumDistanceRatio * second)
+      sightings.push_back({described[k], points.pixels[best]});
   }
   return sightings;
 }
@@ -141,7 +152,7 @@ std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
   for (const Sighting& sighting : sightings) {
     const auto ray = camera.unproject(sighting.pixel);
     const Eigen::Vector3d position = sighting.landmark->state->position();
-    if (!ray || !position.allFinite() || !(ray->head<2>().norm() < kLargestSlope * ray->z()))
+    if (!ray || !position.allFinite() || !(ray->head<2>().norm() < kMaximumSlope * ray->z()))
       continue;
     points.emplace_back(position.x(), position.y(), position.z());
     ideal.emplace_back(focal * ray->x() / ray->z(), focal * ray->y() / ray->z());

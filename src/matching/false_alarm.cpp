@@ -35,11 +35,11 @@ double logFalseAlarms(const Eigen::MatrixXd& S, const std::vector<int>& matches,
     // The others leave point a the covariance L_aa^-1.
     const double before = S.block<2, 2>(2 * i, 2 * i).determinant();
     const double after = 1.0 / L.block<2, 2>(2 * a, 2 * a).determinant();
-    const double share = std::sqrt(std::clamp(after / before, 0.0, 1.0));
-    const double chance = 1.0 - std::pow(1.0 - share, matches[i]);
+    const double fraction = std::sqrt(std::clamp(after / before, 0.0, 1.0));
+    const double chance = 1.0 - std::pow(1.0 - fraction, matches[i]);
     log_chances += std::log(std::max(chance, kLeastChance));
   }
-  // Any three could have fixed the camera, so each counts for the same part.
+  // Any three could have fixed the camera: each of the k contributes (k - 3) / k of its logarithm.
   log_chances *= static_cast<double>(k - kSeeds) / k;
   const double all = std::accumulate(matches.begin(), matches.end(), 0.0);
   return (logChoose(all, kSeeds) + logChoose(n - kSeeds, k - kSeeds) + log_chances) /

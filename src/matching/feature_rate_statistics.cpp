@@ -33,7 +33,7 @@ FeatureRates FeatureRateStatistics::rates(const FeatureRatePrior& prior) const {
   rates.true_positive =
       posterior(static_cast<double>(successes), static_cast<double>(successes + failures),
                 prior.mean.true_positive, prior.searches);
-  // A pixel can't answer twice, whatever was counted.
+  // A pixel gives at most one false positive, whatever was counted.
   const double trials = static_cast<double>(std::max(pixels, spurious));
   rates.false_positive =
       posterior(static_cast<double>(spurious), trials, prior.mean.false_positive, prior.pixels);

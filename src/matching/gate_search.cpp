@@ -6,7 +6,7 @@
 
 namespace active_matching_slam {
 
-std::vector<std::vector<int>> searchFullGates(const ProperPrior& prior, SearchLedger& ledger,
+std::vector<std::vector<int>> searchFullGates(const ProperPrior& prior, BudgetedSearch& budgeted,
                                               bool* cut_short) {
   std::vector<int> order(static_cast<std::size_t>(prior.size()));
   std::iota(order.begin(), order.end(), 0);
@@ -15,12 +15,12 @@ std::vector<std::vector<int>> searchFullGates(const ProperPrior& prior, SearchLe
   });
   std::vector<std::vector<int>> gates(order.size());
   for (const int f : order) {
-    if (ledger.isOverBudget()) {
+    if (budgeted.isOverBudget()) {
       *cut_short = true;
       break;
     }
     gates[static_cast<std::size_t>(f)] =
-        ledger.search(f, {prior.mean(f), prior.covariance(f)}).matches;
+        budgeted.search(f, {prior.mean(f), prior.covariance(f)}).matches;
   }
   return gates;
 }

@@ -9,8 +9,8 @@
 
 namespace active_matching_slam {
 
-std::vector<int> agreeingMeasurements(const Eigen::VectorXd& innovation, const Eigen::MatrixXd& S,
-                                      double chi2_threshold) {
+std::vector<int> leaveOneOutInliers(const Eigen::VectorXd& innovation, const Eigen::MatrixXd& S,
+                                    double chi2_threshold) {
   const int n = static_cast<int>(innovation.size()) / 2;
   if (n == 0) return {};
   const Eigen::LLT<Eigen::MatrixXd> factor(S);

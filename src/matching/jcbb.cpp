@@ -16,11 +16,11 @@ constexpr double kNodeMs = 1e-5;  ///< modelled cost
 /// not on where, so all matches of a feature share its rows.
 class BranchAndBound {
  public:
-  BranchAndBound(const ProperPrior& prior, SearchLedger& ledger,
+  BranchAndBound(const ProperPrior& prior, BudgetedSearch& budgeted,
                  const std::vector<std::vector<int>>& gates, const MatchOptions& options)
-      : prior_(prior), ledger_(ledger), gates_(gates), options_(options), size_(prior.size()) {
+      : prior_(prior), search_(budgeted), gates_(gates), options_(options), size_(prior.size()) {
     for (int n = 1; n <= size_; ++n)
-      limits_.push_back(chiSquareQuantile(n, options.jcbb_confidence));
+      limits_.push_back(chiSquareQuantile(2 * n, options.jcbb_confidence));
     open_gates_.assign(static_cast<std::size_t>(size_) + 1, 0);
     for (int f = size_ - 1; f >= 0; --f)
       open_gates_[slot(f)] = open_gates_[slot(f + 1)] + !gates[slot(f)].empty();
@@ -38,7 +38,7 @@ class BranchAndBound {
   bool cutShort() const { return cut_short_; }
 
  private:
-  /// One pairing of the branch. `stamp` tells the covariance of the branch up to here apart.
+  /// One pairing of the branch. `stamp` identifies the covariance of the branch up to here.
   struct Level {
     int feature = -1;
     std::int64_t stamp = 0;
@@ -59,7 +59,7 @@ class BranchAndBound {
   bool isOutOfBudget() {
     if (options_.jcbb_max_nodes > 0 && nodes_ >= options_.jcbb_max_nodes) cut_short_ = true;
     if ((nodes_ & 255) == 0 && options_.max_milliseconds > 0.0 &&
-        ledger_.spentMilliseconds() >= options_.max_milliseconds)
+        search_.spentMilliseconds() >= options_.max_milliseconds)
       cut_short_ = true;
     return cut_short_;
   }
@@ -110,10 +110,10 @@ class BranchAndBound {
     level.chol_inverse << 1.0 / l00, 0.0, -l10 / (l00 * l11), 1.0 / l11;
     for (const int m : gates_[slot(feature)]) {
       const Eigen::Vector2d y =
-          level.chol_inverse * (ledger_.matches(feature)[slot(m)].pixel - expected);
+          level.chol_inverse * (search_.matches(feature)[slot(m)].pixel - expected);
       const double total = distance2 + y.squaredNorm();
       ++nodes_;
-      ledger_.charge(kNodeMs);
+      search_.charge(kNodeMs);
       if (total <= limits_[slot(depth)]) choices.push_back({total, m, y});
     }
     std::stable_sort(choices.begin(), choices.end(),
@@ -143,7 +143,7 @@ class BranchAndBound {
   }
 
   const ProperPrior& prior_;
-  SearchLedger& ledger_;
+  BudgetedSearch& search_;
   const std::vector<std::vector<int>>& gates_;
   const MatchOptions& options_;
   const int size_;
@@ -163,10 +163,10 @@ class BranchAndBound {
 MatchResult JcbbMatcher::match(const MeasurementPrior& given, FeatureSearch& search,
                                const MatchOptions& options) {
   const ProperPrior prior(given);
-  SearchLedger ledger(prior, search, options);
-  MatchResult result = ledger.begin("jcbb");
-  const auto gates = searchFullGates(prior, ledger, &result.statistics.cut_short);
-  BranchAndBound branch_and_bound(prior, ledger, gates, options);
+  BudgetedSearch budgeted(prior, search, options);
+  MatchResult result = budgeted.begin("jcbb");
+  const auto gates = searchFullGates(prior, budgeted, &result.statistics.cut_short);
+  BranchAndBound branch_and_bound(prior, budgeted, gates, options);
   branch_and_bound.run();
   for (int f = 0; f < prior.size(); ++f)
     result.match_of_feature[static_cast<std::size_t>(prior.original(f))] =
@@ -174,7 +174,7 @@ MatchResult JcbbMatcher::match(const MeasurementPrior& given, FeatureSearch& sea
   result.statistics.nodes = branch_and_bound.nodes();
   result.statistics.mahalanobis2 = branch_and_bound.bestDistance2();
   result.statistics.cut_short |= branch_and_bound.cutShort();
-  ledger.finish(result);
+  budgeted.finish(result);
   return result;
 }
 

@@ -18,13 +18,13 @@ bool isProbability(double p) { return p > 0.0 && p < 1.0; }
 
 }  // namespace
 
-double shareOfBudget(const MatchOptions& options, std::int64_t pixels, double milliseconds) {
-  double share = 0.0;
+double fractionOfBudget(const MatchOptions& options, std::int64_t pixels, double milliseconds) {
+  double fraction = 0.0;
   if (options.max_pixels > 0)
-    share = static_cast<double>(pixels) / static_cast<double>(options.max_pixels);
+    fraction = static_cast<double>(pixels) / static_cast<double>(options.max_pixels);
   if (options.max_milliseconds > 0.0)
-    share = std::max(share, milliseconds / options.max_milliseconds);
-  return share;
+    fraction = std::max(fraction, milliseconds / options.max_milliseconds);
+  return fraction;
 }
 
 void checkMatchOptions(const MatchOptions& o) {
@@ -33,12 +33,13 @@ void checkMatchOptions(const MatchOptions& o) {
   require(isProbability(o.default_rates.false_positive), "default_rates.false_positive",
           o.default_rates.false_positive, "(0, 1)");
   require(o.prune_weight >= 0.0 && o.prune_weight < 1.0, "prune_weight", o.prune_weight, "[0, 1)");
-  require(o.hearing_weight >= 0.0 && o.hearing_weight <= 1.0, "hearing_weight", o.hearing_weight,
-          "[0, 1]");
-  require(o.runners_up >= 0, "runners_up", o.runners_up, "[0, inf)");
+  require(o.deferred_pruning_weight >= 0.0 && o.deferred_pruning_weight <= 1.0,
+          "deferred_pruning_weight", o.deferred_pruning_weight, "[0, 1]");
+  require(o.k_best >= 0, "k_best", o.k_best, "[0, inf)");
   require(o.max_gaussians >= 0, "max_gaussians", o.max_gaussians, "[0, inf)");
   require(o.merge_sigmas >= 0.0, "merge_sigmas", o.merge_sigmas, "[0, inf)");
-  require(o.merge_share >= 0.0 && o.merge_share <= 1.0, "merge_share", o.merge_share, "[0, 1]");
+  require(o.merge_probability >= 0.0 && o.merge_probability <= 1.0, "merge_probability",
+          o.merge_probability, "[0, 1]");
   require(o.latch_information_bits >= 0.0, "latch_information_bits", o.latch_information_bits,
           "[0, inf)");
   require(o.finish_weight >= 0.0 && o.finish_weight <= 1.0, "finish_weight", o.finish_weight,
@@ -51,7 +52,6 @@ void checkMatchOptions(const MatchOptions& o) {
           o.fast_accept_weight, "[0, 1]");
   require(o.max_pixels >= 0, "max_pixels", static_cast<double>(o.max_pixels), "[0, inf)");
   require(o.max_milliseconds >= 0.0, "max_milliseconds", o.max_milliseconds, "[0, inf)");
-  require(o.auto_milliseconds > 0.0, "auto_milliseconds", o.auto_milliseconds, "(0, inf)");
   require(o.jcbb_max_nodes >= 0, "jcbb_max_nodes", static_cast<double>(o.jcbb_max_nodes),
           "[0, inf)");
   require(isProbability(o.jcbb_confidence), "jcbb_confidence", o.jcbb_confidence, "(0, 1)");

@@ -96,8 +96,8 @@ double MeasurementChoice::bound(const Hypothesis& h, const Hypothesis::Candidate
   const double missed = likelihood.in * (gate.area - 1.0);
   const double own = h.weight * (missed * gate.mass + gate.area * (1.0 - gate.mass));
   const double others = (1.0 - h.weight) * std::min(gate.area, likelihood.match + missed);
-  const double share = child / (child + std::max(own, 0.0) + std::max(others, 0.0));
-  const double bits = entropy_ + share * gate.bits;
+  const double probability = child / (child + std::max(own, 0.0) + std::max(others, 0.0));
+  const double bits = entropy_ + probability * gate.bits;
   return bits / gate.area * (1.0 + 1e-9);
 }
 

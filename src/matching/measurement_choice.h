@@ -9,7 +9,7 @@
 
 namespace active_matching_slam {
 
-/// What a search is expected to bring. (Chli 2009, eq. 5.11-5.18)
+/// Expected information of a search. (Chli 2009, eq. 5.11-5.18)
 struct ExpectedInformation {
   double discrete_bits = 0.0;    ///< about which Gaussian is true; may be negative
   double continuous_bits = 0.0;  ///< about where the other features are
@@ -29,8 +29,8 @@ struct Measurement {
 /// Chooses the next search of a mixture.
 class MeasurementChoice {
  public:
-  MeasurementChoice(Mixture& mixture, bool skip_sterile)
-      : mixture_(mixture), skip_sterile_(skip_sterile) {}
+  MeasurementChoice(Mixture& mixture, bool skip_exhausted)
+      : mixture_(mixture), skip_exhausted_(skip_exhausted) {}
 
   /// The candidate of the highest score; ties: the lower Gaussian, then the lower feature.
   /// Candidates whose bound, (H(lambda) + most continuous information) / area, is below the best
@@ -51,9 +51,9 @@ class MeasurementChoice {
     return mixture_.hypotheses()[static_cast<std::size_t>(g)]
                .candidates[static_cast<std::size_t>(c)]
                .open &&
-           !(skip_sterile_ && mixture_.isSterile(g, c));
+           !(skip_exhausted_ && mixture_.isExhausted(g, c));
   }
-  /// Gaussians that see every search of a feature alike: their weights together.
+  /// Gaussians with the same marginal of a feature: their weights together.
   struct Group {
     int representative;
     int entry;
@@ -68,7 +68,7 @@ class MeasurementChoice {
   ExpectedInformation takeIfBetter(int g, int c, Measurement& best);
 
   Mixture& mixture_;
-  bool skip_sterile_;
+  bool skip_exhausted_;
   double entropy_ = 0.0;             // H(lambda) [bits]
   std::vector<double> log_weights_;  // ln(lambda)
   struct FeatureGroups {

@@ -15,11 +15,11 @@ constexpr double kTouchedMs = 6e-5;  ///< modelled cost of a child, for each fea
 
 }  // namespace
 
-Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
+Mixture::Mixture(const ProperPrior& prior, const Joint& joint, BudgetedSearch& budgeted,
                  std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
     : prior_(prior),
       joint_(joint),
-      ledger_(ledger),
+      search_(budgeted),
       options_(options),
       likelihoods_(std::move(likelihoods)) {
   Hypothesis root;
@@ -27,11 +27,11 @@ Mixture::Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& led
   root.joint = joint.prior();
   root.mean.resize(size);
   root.match.assign(size, -1);
-  root.share.assign(size, 1.0);
-  root.lineage.assign(size, -1);
+  root.match_probability.assign(size, 1.0);
+  root.ancestry.assign(size, -1);
   root.candidate_of.assign(size, -1);
   for (int f = 0; f < joint.size(); ++f) {
-    valid_.push_back(ledger.validArea(f));
+    valid_.push_back(budgeted.validArea(f));
     root.mean[slot(f)] = prior.mean(f);
     addCandidate(root, f);
   }
@@ -46,11 +46,11 @@ int Mixture::heaviest() const {
   return best;
 }
 
-int Mixture::unheard() const {
-  constexpr double kLost = 0.2;
+int Mixture::unconfirmed() const {
+  constexpr double kDecayed = 0.2;  // fraction of the largest weight
   for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
     const Hypothesis& h = hypotheses_[slot(k)];
-    if (h.weight < kLost * h.most_weight && awaitsHearing(h)) return k;
+    if (h.weight < kDecayed * h.most_weight && awaitsConfirmation(h)) return k;
   }
   return -1;
 }
@@ -133,38 +133,38 @@ void Mixture::forgetTerms() {
   pairs_.clear();
 }
 
-bool Mixture::liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const {
-  for (int i = h.lineage[slot(f)]; i >= 0; i = searched_[slot(i)].next)
+bool Mixture::liesInAncestry(const Hypothesis& h, int f, const Eigen::Vector2d& p) const {
+  for (int i = h.ancestry[slot(f)]; i >= 0; i = searched_[slot(i)].next)
     if (mahalanobisSquared(searched_[slot(i)].ellipse, p) <= kEllipseRadius2) return true;
   return false;
 }
 
-bool Mixture::isSterile(int g, int c) {
+bool Mixture::isExhausted(int g, int c) {
   constexpr double kSurelyHoldsAPixel = 30.0;  // px^2
   Hypothesis& h = hypotheses_[slot(g)];
   Hypothesis::Candidate& candidate = h.candidates[slot(c)];
   const int f = candidate.feature;
-  const PixelMask& searched = ledger_.searchedPixels(f);
+  const PixelMask& searched = search_.searchedPixels(f);
   const std::int64_t pixels = searched.size();
-  const std::vector<SearchMatch>& known = ledger_.matches(f);
+  const std::vector<SearchMatch>& known = search_.matches(f);
   if (pixels == 0 && candidate.area > kSurelyHoldsAPixel && !candidate.clipped) return false;
-  // Both only grow, so their sum tells whether anything has changed since the last look.
+  // Both only grow, so their sum shows whether anything has changed since the last check.
   const std::int64_t state = 2 * (pixels + static_cast<std::int64_t>(known.size()));
   if (candidate.checked >= 0 && candidate.checked / 2 == state / 2)
     return candidate.checked % 2 == 1;
   const SearchEllipse ellipse = h.ellipse(f);
-  bool sterile = true;
+  bool exhausted = true;
   forEachEllipseRun(ellipse, valid_[slot(f)], [&](const PixelRun& run) {
-    if (sterile) sterile = searched.countMissing(run) == 0;
+    if (exhausted) exhausted = searched.countMissing(run) == 0;
   });
-  for (std::size_t m = 0; m < known.size() && sterile; ++m)
-    sterile = !(mahalanobisSquared(ellipse, known[m].pixel) <= kEllipseRadius2) ||
-              liesInLineage(h, f, known[m].pixel);
-  candidate.checked = state + (sterile ? 1 : 0);
-  return sterile;
+  for (std::size_t m = 0; m < known.size() && exhausted; ++m)
+    exhausted = !(mahalanobisSquared(ellipse, known[m].pixel) <= kEllipseRadius2) ||
+                liesInAncestry(h, f, known[m].pixel);
+  candidate.checked = state + (exhausted ? 1 : 0);
+  return exhausted;
 }
 
-/// Makes f a candidate of h if its ellipse can be searched and lies in none of the lineage.
+/// Makes f a candidate of h if its ellipse can be searched and lies in none of its ancestry.
 void Mixture::addCandidate(Hypothesis& h, int f) const {
   const Marginal& marginal = h.joint->marginal(f);
   if (!(marginal.determinant > 0.0) || !h.mean[slot(f)].allFinite()) return;
@@ -187,7 +187,7 @@ void Mixture::addCandidate(Hypothesis& h, int f) const {
     candidate.child = likelihood(f).match * kEllipseMass;
     candidate.child_log = likelihood(f).child_log;
   }
-  for (int i = h.lineage[slot(f)]; i >= 0; i = searched_[slot(i)].next)
+  for (int i = h.ancestry[slot(f)]; i >= 0; i = searched_[slot(i)].next)
     if (liesInside(ellipse, searched_[slot(i)].ellipse)) return;
   h.candidate_of[slot(f)] = static_cast<int>(h.candidates.size());
   h.candidates.push_back(candidate);
@@ -200,18 +200,18 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, const Child& born) {
   child.joint = joint_.measure(parent.joint, f);
   child.mean = parent.mean;
   child.match = parent.match;
-  child.share = parent.share;
-  child.lineage = parent.lineage;
-  const Eigen::Vector2d found = ledger_.matches(f)[slot(match)].pixel;
+  child.match_probability = parent.match_probability;
+  child.ancestry = parent.ancestry;
+  const Eigen::Vector2d found = search_.matches(f)[slot(match)].pixel;
   const Eigen::Vector2d weighted =
       child.joint->measuredPrecision() * (found - parent.mean[slot(f)]);
   const std::vector<int>& touched = child.joint->touched();
-  ledger_.charge(kTouchedMs * static_cast<double>(touched.size()));
+  search_.charge(kTouchedMs * static_cast<double>(touched.size()));
   for (std::size_t i = 0; i < touched.size(); ++i)
     child.mean[slot(touched[i])].noalias() += child.joint->cross(i) * weighted;
   child.mean[slot(f)] = found;
   child.match[slot(f)] = match;
-  child.share[slot(f)] = born.share;
+  child.match_probability[slot(f)] = born.probability;
   child.log_merged = parent.log_merged + born.log_merged;
   std::vector<char> is_changed(child.mean.size(), 0);
   is_changed[slot(f)] = 1;
@@ -236,14 +236,14 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, const Child& born) {
   return child;
 }
 
-/// All that have fused one match of a feature share an entry.
+/// All hypotheses that have fused one match of a feature have one entry in common.
 int Mixture::entryOfFused(int f, int match) {
   std::vector<FusedEntry>& known = fused_entries_[slot(f)];
   if (known.size() <= slot(match)) known.resize(slot(match) + 1);
   PairTable& pairs = pairs_[slot(f)];
   FusedEntry& fused = known[slot(match)];
   if (fused.entry != PairTable::kNone && pairs.serial(fused.entry) == fused.serial) {
-    pairs.share(fused.entry);
+    pairs.retain(fused.entry);
   } else {
     fused.entry = pairs.acquire();
     fused.serial = fused.entry == PairTable::kNone ? 0 : pairs.serial(fused.entry);
@@ -260,7 +260,7 @@ void Mixture::takeEntries(Hypothesis& child, const Hypothesis& parent, int f,
       child.entry[t] = t == slot(f) ? entryOfFused(f, child.match[t]) : pairs_[t].acquire();
     } else {
       child.entry[t] = parent.entry[t];
-      pairs_[t].share(child.entry[t]);
+      pairs_[t].retain(child.entry[t]);
     }
   }
 }
@@ -274,10 +274,10 @@ SearchOutcome Mixture::searchOnly(int g, int c) {
   Hypothesis& h = hypotheses_[slot(g)];
   const int f = h.candidates[slot(c)].feature;
   const SearchEllipse ellipse = h.ellipse(f);
-  if (ledger_.searchedPixels(f).size() == 0) first_searched_.push_back(f);
-  SearchOutcome outcome = ledger_.search(f, ellipse);
-  searched_.push_back({ellipse, h.lineage[slot(f)]});
-  h.lineage[slot(f)] = static_cast<int>(searched_.size()) - 1;
+  if (search_.searchedPixels(f).size() == 0) first_searched_.push_back(f);
+  SearchOutcome outcome = search_.search(f, ellipse);
+  searched_.push_back({ellipse, h.ancestry[slot(f)]});
+  h.ancestry[slot(f)] = static_cast<int>(searched_.size()) - 1;
   h.candidates[slot(c)].open = false;
   h.was_searched = true;
   return outcome;
@@ -288,9 +288,9 @@ void Mixture::fuse(int g, int c, int match) {
   const Hypothesis::Candidate& candidate = h.candidates[slot(c)];
   const int f = candidate.feature;
   double taken = 0.0, all = 0.0;
-  for (int m = 0; m < static_cast<int>(ledger_.matches(f).size()); ++m) {
+  for (int m = 0; m < static_cast<int>(search_.matches(f).size()); ++m) {
     const double p =
-        massOfPixel(ledger_.matches(f)[slot(m)].pixel, h.mean[slot(f)], h.covariance(f));
+        massOfPixel(search_.matches(f)[slot(m)].pixel, h.mean[slot(f)], h.covariance(f));
     all += p;
     if (m == match) taken = p;
   }

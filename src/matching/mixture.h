@@ -8,17 +8,17 @@
 
 #include "active_matching_slam/matching/match_result.h"
 #include "active_matching_slam/matching/search_ellipse.h"
+#include "budgeted_search.h"
 #include "joint.h"
 #include "pair_table.h"
-#include "search_ledger.h"
 
 namespace active_matching_slam {
 
-/// Likelihood of what a search of a feature brings, divided by that of nothing but clutter (Chli
+/// Likelihood of the outcome of a feature's search, relative to that of clutter alone (Chli
 /// 2009, eq. 5.5-5.8): no power of the number of pixels is ever formed.
 struct SearchLikelihood {
   double true_positive = 0.0;
-  double in = 0.0;            ///< the feature is inside and was missed: Pfn / Ptn
+  double in = 0.0;            ///< the feature is inside, missed detection: Pfn / Ptn
   double match = 0.0;         ///< one of the matches is the feature: Ptp / Pfp
   double child_log = 0.0;     ///< c ln(c), c = match * mass of a whole ellipse
   double clutter_odds = 0.0;  ///< Pfp / Ptn
@@ -33,10 +33,12 @@ struct SearchLikelihood {
   }
 };
 
-/// Of a hypothesis that is worth a second look, once.
-constexpr double kRunnerUpWeight = 0.1;
+/// Largest weight a hypothesis must once have had to count among the k-best alternatives. Cost:
+/// each is searched to completion.
+constexpr double kAlternativeWeight = 0.1;
 
-/// One Gaussian of the mixture: a scenario of matches, and what it expects of the features left.
+/// One Gaussian of the mixture: a data-association hypothesis, and its prediction of the features
+/// that are not matched yet.
 struct Hypothesis {
   /// A feature that can be searched here.
   struct Candidate {
@@ -48,7 +50,7 @@ struct Hypothesis {
     double bits = 0.0;          ///< continuous information of a match
     double child = 0.0;         ///< match * mass: a match's factor for the child
     double child_log = 0.0;     ///< child * ln(child)
-    std::int64_t checked = -1;  ///< cache of Mixture::isSterile
+    std::int64_t checked = -1;  ///< cache of Mixture::isExhausted
   };
   /// Sum of p over the first `runs` runs of the pixels searched.
   struct PixelMass {
@@ -58,14 +60,14 @@ struct Hypothesis {
   };
   int id = 0, parent = -1;
   double log_weight = 0.0, weight = 1.0;
-  double most_weight = 1.0;  ///< it ever had
+  double most_weight = 1.0;  ///< largest weight so far
   bool was_searched = false;
   double log_merged = 0.0;  ///< what merged siblings added to log_weight
   std::shared_ptr<const Conditional> joint;
-  std::vector<Eigen::Vector2d> mean;    ///< F, the match for a fused feature [px]
-  std::vector<int> match;               ///< F, -1: not fused
-  std::vector<double> share;            ///< F, of the match among those merged with it
-  std::vector<int> lineage;             ///< F, newest ellipse searched, in Mixture's pool; -1: none
+  std::vector<Eigen::Vector2d> mean;      ///< F, the match for a fused feature [px]
+  std::vector<int> match;                 ///< F, -1: not fused
+  std::vector<double> match_probability;  ///< F, posterior of the match among those merged with it
+  std::vector<int> ancestry;            ///< F, newest ellipse searched, in Mixture's pool; -1: none
   std::vector<Candidate> candidates;    ///< by feature, as they were at birth
   std::vector<int> candidate_of;        ///< F, index into candidates; -1: none
   std::vector<PixelMass> pixel_masses;  ///< cache
@@ -83,7 +85,7 @@ struct Hypothesis {
   }
 };
 
-/// A hypothesis, its matches completed by Mixture::recount, and its probability.
+/// A hypothesis, its matches completed by Mixture::rescoreJointly, and its posterior probability.
 struct Explanation {
   const Hypothesis* hypothesis = nullptr;
   std::vector<int> match;  ///< F
@@ -95,7 +97,7 @@ struct Explanation {
 class Mixture {
  public:
   /// All but the likelihoods must outlive it.
-  Mixture(const ProperPrior& prior, const Joint& joint, SearchLedger& ledger,
+  Mixture(const ProperPrior& prior, const Joint& joint, BudgetedSearch& budgeted,
           std::vector<SearchLikelihood> likelihoods, const MatchOptions& options);
 
   int features() const { return joint_.size(); }
@@ -111,49 +113,52 @@ class Mixture {
   double mass(int k, int c, int g);
   /// The same, k != g, with the factors that follow from it.
   const PairTerm& term(int k, int c, int g);
-  /// As g sees its own search; what a match adds goes to the child.
+  /// The same for k = g; what a match adds goes to the child.
   const PairTerm& ownTerm(int g, int c);
-  /// Frees what only term() needs; it is not to be asked any more.
+  /// Frees what only term() needs; term() must not be called any more.
   void forgetTerms();
-  /// Rule incremental: a search of candidate c of g would see neither a new pixel nor a match that
-  /// is known but outside the ellipses that g or its ancestors searched.
-  bool isSterile(int g, int c);
+  /// Rule incremental: a search of candidate c of g is uninformative, since it would bring neither
+  /// a new pixel nor a known match outside the ellipses that g or its ancestors searched.
+  bool isExhausted(int g, int c);
 
-  /// The hypothesis that is to be heard before anything else is searched; -1: none.
-  int unheard() const;
+  /// Deferred pruning: the hypothesis that is to be searched next to confirm or refute it; -1:
+  /// none.
+  int unconfirmed() const;
 
-  /// Searches candidate c of hypothesis g and updates the mixture. `step` gets what came of it.
+  /// Searches candidate c of hypothesis g and updates the mixture. `step` gets the outcome.
   void searchAndUpdate(int g, int c, MatchStep& step);
-  /// Fuses a match of the candidate's feature into g, just searched, without asking the others; g
-  /// keeps its id and weight. That it may be another match, or none, counts as dropped.
+  /// Fuses a match of the candidate's feature into g, just searched, without an update of the other
+  /// weights; g keeps its id and weight. The probability of another match, or none, is lost.
   void fuse(int g, int c, int match);
   /// The hypotheses as they are, heaviest first.
   std::vector<Explanation> explanations() const;
   /// Searches candidate c of hypothesis g, and marks it as searched, without an update.
   SearchOutcome searchOnly(int g, int c);
 
-  /// The hypotheses, and those that were dropped while matches that others found could still be
-  /// theirs, judged anew by all that was found; the most probable first. The probabilities sum to
-  /// less than 1 by that of what was dropped otherwise.
+  /// Joint re-scoring: posteriors of the live hypotheses, and of those pruned while they had
+  /// unclaimed matches, from the joint evidence of all matches; the most probable first. They sum
+  /// to 1 less the probability of whatever else was pruned.
   ///
-  /// The weights of the mixture alone are no probabilities. To a hypothesis that is not searched
-  /// itself they credit what others found in its ellipses as if features were independent, though
-  /// the place of one tells those of all others. So the longer it waits the lighter it gets, until
-  /// it is dropped. Here it takes up what was found, match by match, each expected where the ones
-  /// before tell: the evidence is the joint density of all its matches.
-  std::vector<Explanation> recount() const;
+  /// The weights of the mixture alone are no posteriors: a hypothesis that was not searched itself
+  /// is weighted by the matches that others found in its ellipses as if features were independent,
+  /// so its weight decays with every such search until it is pruned. Here it claims these matches
+  /// one by one, each predicted from the ones before (chain rule): the evidence is their joint
+  /// density.
+  std::vector<Explanation> rescoreJointly() const;
 
-  /// Whether the heaviest hypothesis misses more features than their rates explain. Where structure
-  /// repeats, one that is wrong finds a good part of the features, and each of those speaks against
-  /// the true one, which is dropped before anything was searched where it expects it.
-  bool heaviestFallsShort() const;
-  /// Sets the hypotheses aside for the recount, and begins anew with the one of them, or of those
-  /// dropped, that was likeliest once and has not been searched to its end. False if there is none.
-  bool beginRunnerUp();
+  /// Whether the heaviest hypothesis has more missed detections than the features' rates explain.
+  /// Where structure repeats, a wrong hypothesis finds many of the features, and each of its
+  /// matches lowers the weight of the true one, which is pruned before any of its own ellipses was
+  /// searched.
+  bool heaviestMissesTooMany() const;
+  /// Keeps the hypotheses for joint re-scoring, and restarts the mixture from the best alternative:
+  /// of all kept ones that are not searched to completion, the one of the largest weight so far.
+  /// False if there is none.
+  bool beginAlternative();
 
-  /// Whether the options ask for recount(), and the rule of update allows it.
-  bool recounts() const {
-    return options_.recount && options_.update_rule == UpdateRule::kIncremental;
+  /// Whether the options ask for rescoreJointly(), and the rule of update allows it.
+  bool rescoresJointly() const {
+    return options_.joint_rescoring && options_.update_rule == UpdateRule::kIncremental;
   }
 
   int mostGaussians() const { return most_gaussians_; }
@@ -162,40 +167,41 @@ class Mixture {
  private:
   struct SearchedEllipse {
     SearchEllipse ellipse;
-    int next;  ///< older one of the same feature and lineage, -1: none
+    int next;  ///< older one of the same feature and ancestry, -1: none
   };
   struct Child {
     int match;
     double log_weight;
-    double share = 1.0;       ///< of its own in log_weight
-    double log_merged = 0.0;  ///< what merged siblings added to log_weight
+    double probability = 1.0;  ///< of its match among those merged with it
+    double log_merged = 0.0;   ///< what merged siblings added to log_weight
   };
 
-  /// How well a hypothesis explains what was found for some features, relative to clutter alone.
+  /// Joint evidence for a hypothesis from the matches of some features, relative to clutter alone.
   struct Evidence {
-    std::vector<int> match;    ///< F, completed
-    double log_claimed = 0.0;  ///< by these matches
-    double log_any = 0.0;      ///< by all that the hypothesis allows
+    std::vector<int> match;       ///< F, completed
+    double log_likelihood = 0.0;  ///< of these matches
+    double log_evidence = 0.0;    ///< summed over all matches that the hypothesis allows
   };
 
-  /// Whether others found matches that may be its own.
-  bool lags(const Hypothesis& h) const;
-  bool awaitsHearing(const Hypothesis& h) const {
-    return options_.hearing_weight > 0.0 && !h.was_searched &&
-           h.most_weight >= options_.hearing_weight && h.hasOpenCandidate();
+  /// Whether other hypotheses found matches in its ellipses that it has not searched for.
+  bool hasUnclaimedMatches(const Hypothesis& h) const;
+  bool awaitsConfirmation(const Hypothesis& h) const {
+    return options_.deferred_pruning_weight > 0.0 && !h.was_searched &&
+           h.most_weight >= options_.deferred_pruning_weight && h.hasOpenCandidate();
   }
-  /// What was found for a feature, as a hypothesis that expects it so sees it.
-  struct View {
-    SearchEllipse expected;
-    int best = -1;         ///< the likeliest match that it may claim
-    double of_best = 0.0;  ///< its likelihood, relative to clutter alone
-    double any = 1.0;      ///< likelihood of all that was found
+  /// Evidence for a hypothesis from one feature's matches, given where it predicts the feature;
+  /// likelihoods relative to clutter alone.
+  struct FeatureEvidence {
+    SearchEllipse predicted;
+    int best = -1;                 ///< the likeliest match that it may claim
+    double best_likelihood = 0.0;  ///< of that match
+    double likelihood = 1.0;       ///< of all matches of the feature
   };
-  View viewOf(const Hypothesis& h, int f, const SearchEllipse& expected) const;
+  FeatureEvidence featureEvidence(const Hypothesis& h, int f, const SearchEllipse& predicted) const;
   std::vector<int> contradictions(const Hypothesis& a, const Hypothesis& b,
                                   std::size_t skipped) const;
   Evidence evidenceOf(const Hypothesis& h, const std::vector<int>& features) const;
-  bool liesInLineage(const Hypothesis& h, int f, const Eigen::Vector2d& p) const;
+  bool liesInAncestry(const Hypothesis& h, int f, const Eigen::Vector2d& p) const;
   void addCandidate(Hypothesis& h, int f) const;
   double pixelMass(Hypothesis& h, int f);
   /// Z_kf of rule incremental.
@@ -217,7 +223,7 @@ class Mixture {
 
   const ProperPrior& prior_;
   const Joint& joint_;
-  SearchLedger& ledger_;
+  BudgetedSearch& search_;
   const MatchOptions& options_;
   std::vector<SearchLikelihood> likelihoods_;
   std::vector<PixelBox> valid_;
@@ -234,11 +240,11 @@ class Mixture {
   int next_id_ = 1;
   int most_gaussians_ = 1;
   bool was_capped_ = false;
-  // For recount()
-  std::vector<int> first_searched_;  // features, in order
-  std::vector<Hypothesis> aside_;    // dropped while they lagged, or were likely once
-  std::vector<Hypothesis> ended_;    // searched to their end, or passed over, before a runner-up
-  double kept_ = 1.0;                // probability of all that was not dropped otherwise
+  // For rescoreJointly()
+  std::vector<int> first_searched_;    // features, in order
+  std::vector<Hypothesis> pruned_;     // with unclaimed matches, or once of kAlternativeWeight
+  std::vector<Hypothesis> completed_;  // searched to completion before an alternative
+  double kept_ = 1.0;                  // probability mass that was not pruned for good
 };
 
 }  // namespace active_matching_slam

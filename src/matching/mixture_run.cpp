@@ -8,16 +8,16 @@
 namespace active_matching_slam {
 namespace {
 
-/// Share of the budget after which the heaviest Gaussian is taken whether it dominates or not.
-constexpr double kBudgetForDoubt = 0.75;
+/// Cost: fraction of the budget after which the search commits to the heaviest Gaussian whether it
+/// dominates or not.
+constexpr double kCommitFraction = 0.75;
 
 std::vector<SearchLikelihood> likelihoodsOf(const MeasurementPrior& given, const ProperPrior& prior,
                                             const MatchOptions& options) {
   std::vector<SearchLikelihood> likelihoods;
   for (int f = 0; f < prior.size(); ++f)
-    likelihoods.emplace_back(given.rates.empty() || !options.use_feature_rates
-                                 ? options.default_rates
-                                 : given.rates[slot(prior.original(f))]);
+    likelihoods.emplace_back(given.rates.empty() ? options.default_rates
+                                                 : given.rates[slot(prior.original(f))]);
   return likelihoods;
 }
 
@@ -32,12 +32,12 @@ double informationLeft(const Hypothesis& h, const std::vector<int>& match) {
 }  // namespace
 
 MixtureRun::MixtureRun(const MeasurementPrior& given, const ProperPrior& prior, const Joint& joint,
-                       SearchLedger& ledger, const MatchOptions& options, Policy policy)
+                       BudgetedSearch& budgeted, const MatchOptions& options, Policy policy)
     : prior_(prior),
-      ledger_(ledger),
+      search_(budgeted),
       options_(options),
       policy_(policy),
-      mixture_(prior, joint, ledger, likelihoodsOf(given, prior, options), options),
+      mixture_(prior, joint, budgeted, likelihoodsOf(given, prior, options), options),
       choice_(mixture_, options.update_rule == UpdateRule::kIncremental),
       random_(options.seed) {}
 
@@ -45,20 +45,20 @@ void MixtureRun::run(MatchResult& result) {
   MatchStatistics& statistics = result.statistics;
   const Hypothesis& root = mixture_.hypotheses().front();
   statistics.information_bits_start = informationLeft(root, root.match);
-  const double correlation_before = ledger_.correlationSeconds();
-  const double start = ledger_.now();
+  const double correlation_before = search_.correlationSeconds();
+  const double start = search_.now();
   double information_s = searchToEnd(result);
-  int runners_up = mixture_.recounts() ? options_.runners_up : 0;
-  while (runners_up-- > 0 && !statistics.cut_short && mixture_.heaviestFallsShort() &&
-         mixture_.beginRunnerUp()) {
+  int alternatives = mixture_.rescoresJointly() ? options_.k_best : 0;
+  while (alternatives-- > 0 && !statistics.cut_short && mixture_.heaviestMissesTooMany() &&
+         mixture_.beginAlternative()) {
     latched_ = false;
     information_s += searchToEnd(result);
   }
   statistics.cut_short |= mixture_.wasCapped();
   report(result);
-  const double correlation_s = ledger_.correlationSeconds() - correlation_before;
+  const double correlation_s = search_.correlationSeconds() - correlation_before;
   statistics.information_ms += 1e3 * information_s;
-  statistics.mixture_ms += 1e3 * (ledger_.now() - start - information_s - correlation_s);
+  statistics.mixture_ms += 1e3 * (search_.now() - start - information_s - correlation_s);
 }
 
 double MixtureRun::searchToEnd(MatchResult& result) {
@@ -67,16 +67,16 @@ double MixtureRun::searchToEnd(MatchResult& result) {
     const bool dominates =
         policy_ == Policy::kFast && latched_ &&
         mixture_.hypotheses()[slot(mixture_.heaviest())].weight > options_.fast_accept_weight;
-    const bool must_end = ledger_.budgetUsed() >= kBudgetForDoubt;
+    const bool must_end = search_.fractionUsed() >= kCommitFraction;
     if (dominates || must_end) {
       result.statistics.cut_short |= must_end;
       if (!latched_) latch();
       acceptNearest(result);
       break;
     }
-    const double before_choice = ledger_.now();
+    const double before_choice = search_.now();
     const Measurement next = choose();
-    information_s += ledger_.now() - before_choice;
+    information_s += search_.now() - before_choice;
     if (!next.exists()) break;
     MatchStep step = begin(next);
     mixture_.searchAndUpdate(next.hypothesis, next.candidate, step);
@@ -92,9 +92,9 @@ bool MixtureRun::isFinished() const {
 }
 
 Measurement MixtureRun::choose() {
-  const int unheard = mixture_.unheard();
-  if (unheard >= 0) {
-    const Measurement next = choice_.bestOf(unheard);
+  const int unconfirmed = mixture_.unconfirmed();
+  if (unconfirmed >= 0) {
+    const Measurement next = choice_.bestOf(unconfirmed);
     if (next.exists()) return next;
   }
   if (latched_) return chooseAfterLatch();
@@ -131,14 +131,14 @@ Measurement MixtureRun::chooseAfterLatch() {
   return {};
 }
 
-/// The heaviest Gaussian, which dominates or must do, takes the match nearest to each prediction
-/// that is left to it.
+/// Nearest neighbour: the heaviest Gaussian, which dominates or is committed to, takes the match
+/// nearest to each of its remaining predictions.
 void MixtureRun::acceptNearest(MatchResult& result) {
   const int dominant = mixture_.heaviest();
   while (true) {
     const Measurement next = choice_.firstOf(dominant);
     if (!next.exists()) return;
-    if (ledger_.isOverBudget()) {
+    if (search_.isOverBudget()) {
       result.statistics.cut_short = true;
       return;
     }
@@ -152,7 +152,7 @@ void MixtureRun::acceptNearest(MatchResult& result) {
     int nearest = -1;
     double nearest2 = 0.0;
     for (const int m : outcome.matches) {
-      const double d2 = mahalanobisSquared(step.ellipse, ledger_.matches(feature)[slot(m)].pixel);
+      const double d2 = mahalanobisSquared(step.ellipse, search_.matches(feature)[slot(m)].pixel);
       if (nearest >= 0 && d2 >= nearest2) continue;
       nearest = m;
       nearest2 = d2;
@@ -189,14 +189,15 @@ void MixtureRun::record(MatchStep step, MatchResult& result) const {
 std::vector<int> MixtureRun::matchesOf(const Explanation& e) const {
   std::vector<int> matches(slot(prior_.size() + prior_.leftOut()), -1);
   for (int f = 0; f < prior_.size(); ++f)
-    if (e.hypothesis->share[slot(f)] >= options_.merge_share)
+    if (e.hypothesis->match_probability[slot(f)] >= options_.merge_probability)
       matches[slot(prior_.original(f))] = e.match[slot(f)];
   return matches;
 }
 
 void MixtureRun::report(MatchResult& result) const {
-  const std::vector<Explanation> all =
-      mixture_.recounts() && !ledger_.isOverBudget() ? mixture_.recount() : mixture_.explanations();
+  const std::vector<Explanation> all = mixture_.rescoresJointly() && !search_.isOverBudget()
+                                           ? mixture_.rescoreJointly()
+                                           : mixture_.explanations();
   const Explanation& accepted = all.front();
   MatchStatistics& statistics = result.statistics;
   statistics.max_gaussians = mixture_.mostGaussians();
@@ -213,7 +214,7 @@ void MixtureRun::report(MatchResult& result) const {
   result.match_of_feature = result.hypotheses.front().match_of_feature;
   statistics.ambiguous = accepted.probability < options_.ambiguous_below_weight;
   if (!statistics.ambiguous) return;
-  // Strong are the most probable hypotheses that together reach the probability asked for.
+  // The most probable hypotheses that together reach the required probability must agree.
   double together = accepted.probability;
   for (std::size_t k = 1;
        k < result.hypotheses.size() && together < options_.ambiguous_below_weight; ++k) {
@@ -225,13 +226,13 @@ void MixtureRun::report(MatchResult& result) const {
   }
 }
 
-/// Whether `e` has accepted the match, or would find it where it has not looked yet.
+/// Whether `e` has accepted the match, or would find it in an ellipse that it has not searched yet.
 bool MixtureRun::agrees(const Explanation& e, int feature, int match) const {
   const Hypothesis& h = *e.hypothesis;
   const int c = h.candidate_of[slot(feature)];
   if (e.match[slot(feature)] >= 0 || c < 0 || !h.candidates[slot(c)].open)
     return e.match[slot(feature)] == match;
-  return mahalanobisSquared(h.ellipse(feature), ledger_.matches(feature)[slot(match)].pixel) <=
+  return mahalanobisSquared(h.ellipse(feature), search_.matches(feature)[slot(match)].pixel) <=
          kEllipseRadius2;
 }
 

@@ -2,10 +2,10 @@
 
 #include <vector>
 
+#include "budgeted_search.h"
 #include "joint.h"
 #include "measurement_choice.h"
 #include "mixture.h"
-#include "search_ledger.h"
 
 namespace active_matching_slam {
 
@@ -17,9 +17,9 @@ class MixtureRun {
 
   /// `given` is the prior as handed in, `prior` its proper part.
   MixtureRun(const MeasurementPrior& given, const ProperPrior& prior, const Joint& joint,
-             SearchLedger& ledger, const MatchOptions& options, Policy policy);
+             BudgetedSearch& budgeted, const MatchOptions& options, Policy policy);
 
-  /// Runs, and fills the result (but for what SearchLedger::finish writes).
+  /// Runs, and fills the result (but for what BudgetedSearch::finish writes).
   void run(MatchResult& result);
 
  private:
@@ -38,7 +38,7 @@ class MixtureRun {
   std::vector<int> matchesOf(const Explanation& e) const;
 
   const ProperPrior& prior_;
-  SearchLedger& ledger_;
+  BudgetedSearch& search_;
   const MatchOptions& options_;
   Policy policy_;
   Mixture mixture_;

@@ -11,20 +11,20 @@
 namespace active_matching_slam {
 namespace {
 
-/// Below this a likelihood is taken as this: a logarithm must stay finite.
+/// Floor of a likelihood, so that its logarithm stays finite.
 constexpr double kLeastLikelihood = 1e-9;
-/// Logarithm of the odds that the better of two near matches is the true one, by the difference of
-/// their similarities.
-constexpr double kScoreCredit = 20.0;
-/// Modelled cost of weighing one Gaussian by what is known of a feature, and of each match.
+/// Log-odds that the better of two near matches is the true one, per difference of their similarity
+/// (ZNCC).
+constexpr double kLogOddsPerScore = 20.0;
+/// Cost: of updating one Gaussian's weight by a feature's search, and of each match.
 constexpr double kWeighingMs = 1e-3, kWeighingMatchMs = 2e-5;
-/// Dropped hypotheses that are kept for the recount, so many at most.
-constexpr std::size_t kMostAside = 32;
+/// Cost: most pruned hypotheses that are kept for joint re-scoring.
+constexpr std::size_t kMaxPruned = 32;
 
 }  // namespace
 
 double Mixture::pixelMass(Hypothesis& h, int f) {
-  const PixelMask& mask = ledger_.searchedPixels(f);
+  const PixelMask& mask = search_.searchedPixels(f);
   const std::vector<PixelRun>& runs = mask.history();
   for (Hypothesis::PixelMass& known : h.pixel_masses) {
     if (known.feature != f) continue;
@@ -39,18 +39,18 @@ double Mixture::pixelMass(Hypothesis& h, int f) {
   return std::min(1.0, sum);
 }
 
-/// match * sum of p over the matches outside the own lineage + in * max(0, A - sum of p over all) +
-/// 1 - A
+/// match * sum of p over the matches outside the own ancestry + in * max(0, A - sum of p over all)
+/// + 1 - A
 double Mixture::explained(Hypothesis& h, int f) {
-  const std::vector<SearchMatch>& known = ledger_.matches(f);
-  ledger_.charge(kWeighingMs + kWeighingMatchMs * static_cast<double>(known.size()));
+  const std::vector<SearchMatch>& known = search_.matches(f);
+  search_.charge(kWeighingMs + kWeighingMatchMs * static_cast<double>(known.size()));
   const double searched_mass = pixelMass(h, f);
   const Eigen::Matrix2d covariance = h.covariance(f);
   double all = 0.0, foreign = 0.0;
   for (const SearchMatch& m : known) {
     const double p = massOfPixel(m.pixel, h.mean[slot(f)], covariance);
     all += p;
-    if (!liesInLineage(h, f, m.pixel)) foreign += p;
+    if (!liesInAncestry(h, f, m.pixel)) foreign += p;
   }
   const SearchLikelihood& likelihood = this->likelihood(f);
   const double z = likelihood.match * foreign + likelihood.in * std::max(0.0, searched_mass - all) +
@@ -63,29 +63,29 @@ void Mixture::updateIncremental(int g, int c, MatchStep& step, std::vector<Child
   const auto counts = [&](const Hypothesis& h) {
     return !h.isFused(f) && h.joint->marginal(f).determinant > 0.0;
   };
-  // Nobody has searched the feature: every Z is 1.
-  const bool fresh = ledger_.searchedPixels(f).size() == 0 && ledger_.matches(f).empty();
+  // Before a feature's first search every Z is 1.
+  const bool fresh = search_.searchedPixels(f).size() == 0 && search_.matches(f).empty();
   std::vector<double> before(hypotheses_.size(), 1.0);
   for (std::size_t k = 0; k < hypotheses_.size() && !fresh; ++k)
     if (counts(hypotheses_[k])) before[k] = explained(hypotheses_[k], f);
   Hypothesis& searcher = hypotheses_[slot(g)];
-  const int lineage_before = searcher.lineage[slot(f)];
+  const int ancestry_before = searcher.ancestry[slot(f)];
   const SearchOutcome outcome = searchOnly(g, c);
   step.pixels_in_ellipse = outcome.pixels_in_ellipse;
   step.pixels_new = outcome.pixels_new;
   step.matches = outcome.matches;
-  // Only what neither g nor its ancestors have seen spawns.
+  // Only matches outside the ellipses of g and its ancestors spawn children.
   const double base = searcher.log_weight - std::log(before[slot(g)]);
   const Eigen::Matrix2d covariance = searcher.covariance(f);
-  const int lineage_after = searcher.lineage[slot(f)];
-  searcher.lineage[slot(f)] = lineage_before;
+  const int ancestry_after = searcher.ancestry[slot(f)];
+  searcher.ancestry[slot(f)] = ancestry_before;
   for (const int m : outcome.matches) {
-    const Eigen::Vector2d& pixel = ledger_.matches(f)[slot(m)].pixel;
-    if (liesInLineage(searcher, f, pixel)) continue;
+    const Eigen::Vector2d& pixel = search_.matches(f)[slot(m)].pixel;
+    if (liesInAncestry(searcher, f, pixel)) continue;
     const double p = massOfPixel(pixel, searcher.mean[slot(f)], covariance);
     children.push_back({m, base + std::log(likelihood(f).match * p)});
   }
-  searcher.lineage[slot(f)] = lineage_after;
+  searcher.ancestry[slot(f)] = ancestry_after;
   for (std::size_t k = 0; k < hypotheses_.size(); ++k)
     if (counts(hypotheses_[k]))
       hypotheses_[k].log_weight += std::log(explained(hypotheses_[k], f) / before[k]);
@@ -102,11 +102,11 @@ void Mixture::updateThesis(int g, int c, MatchStep& step, std::vector<Child>& ch
   for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
     Hypothesis& h = hypotheses_[slot(k)];
     if (!(h.joint->marginal(f).determinant > 0.0)) continue;
-    ledger_.charge(kWeighingMs);
+    search_.charge(kWeighingMs);
     const Eigen::Matrix2d covariance = h.covariance(f);
     double sum = 0.0;
     for (const int m : outcome.matches) {
-      const double p = massOfPixel(ledger_.matches(f)[slot(m)].pixel, h.mean[slot(f)], covariance);
+      const double p = massOfPixel(search_.matches(f)[slot(m)].pixel, h.mean[slot(f)], covariance);
       sum += p;
       if (k == g) children.push_back({m, base + std::log(likelihood.match * p)});
     }
@@ -129,9 +129,9 @@ void Mixture::searchAndUpdate(int g, int c, MatchStep& step) {
   reweigh(g, f, children, step);
 }
 
-/// Joins children that expect nearly the same of all features left: they differ in no more than
+/// Merges children with nearly the same predictions of all other features: they differ only in
 /// which of some near matches is this feature's. Otherwise k features with two near matches each
-/// would make 2^k Gaussians. Position can hardly tell such matches apart; similarity can.
+/// would make 2^k Gaussians. Position hardly discriminates between such matches; similarity does.
 void Mixture::mergeSiblings(int g, int f, std::vector<Child>& children) const {
   if (children.size() < 2 || !(options_.merge_sigmas > 0.0)) return;
   const Hypothesis& parent = hypotheses_[slot(g)];
@@ -146,30 +146,30 @@ void Mixture::mergeSiblings(int g, int f, std::vector<Child>& children) const {
   const double limit = options_.merge_sigmas * options_.merge_sigmas;
   const auto isNear = [&](const Child& a, const Child& b) {
     const Eigen::Vector2d apart =
-        ledger_.matches(f)[slot(a.match)].pixel - ledger_.matches(f)[slot(b.match)].pixel;
+        search_.matches(f)[slot(a.match)].pixel - search_.matches(f)[slot(b.match)].pixel;
     for (std::size_t i = 0; i < gains.size(); ++i) {
       const Eigen::Vector2d shift = gains[i] * apart;
       if (shift.dot(precisions[i] * shift) > limit) return false;
     }
     return true;
   };
-  const auto credit = [&](const Child& child) {
-    return child.log_weight + kScoreCredit * ledger_.matches(f)[slot(child.match)].score;
+  const auto log_odds = [&](const Child& child) {
+    return child.log_weight + kLogOddsPerScore * search_.matches(f)[slot(child.match)].score;
   };
   std::stable_sort(children.begin(), children.end(),
-                   [&](const Child& a, const Child& b) { return credit(a) > credit(b); });
+                   [&](const Child& a, const Child& b) { return log_odds(a) > log_odds(b); });
   std::vector<Child> kept;
-  std::vector<double> credits;
+  std::vector<double> kept_log_odds;
   for (const Child& child : children) {
     const auto near = std::find_if(kept.begin(), kept.end(),
                                    [&](const Child& other) { return isNear(other, child); });
     if (near == kept.end()) {
       kept.push_back(child);
-      credits.push_back(credit(child));
+      kept_log_odds.push_back(log_odds(child));
       continue;
     }
-    const double best = credits[static_cast<std::size_t>(near - kept.begin())];
-    near->share = 1.0 / (1.0 / near->share + std::exp(credit(child) - best));
+    const double best = kept_log_odds[static_cast<std::size_t>(near - kept.begin())];
+    near->probability = 1.0 / (1.0 / near->probability + std::exp(log_odds(child) - best));
     const double more = std::log1p(std::exp(child.log_weight - near->log_weight));
     near->log_weight += more;
     near->log_merged += more;
@@ -177,8 +177,8 @@ void Mixture::mergeSiblings(int g, int f, std::vector<Child>& children) const {
   children = std::move(kept);
 }
 
-/// Normalises, drops what is too light, and only then makes the children: thousands of spurious
-/// matches cost thousands of weights, not thousands of Gaussians.
+/// Normalises, prunes, and only then makes the children: thousands of spurious matches cost
+/// thousands of weights, not thousands of Gaussians.
 void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& step) {
   mergeSiblings(g, f, children);
   struct Entry {
@@ -218,16 +218,16 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
   for (const Entry& e : entries) heaviest = std::max(heaviest, e.weight);
   double least = std::min(options_.prune_weight, heaviest);
   const auto limit = slot(options_.max_gaussians);
-  const auto dropLight = [&] {
-    entries.erase(
-        std::remove_if(entries.begin(), entries.end(),
-                       [&](const Entry& e) {
-                         return e.weight < least &&
-                                !(e.index < old_count && awaitsHearing(hypotheses_[slot(e.index)]));
-                       }),
-        entries.end());
+  const auto prune = [&] {
+    entries.erase(std::remove_if(entries.begin(), entries.end(),
+                                 [&](const Entry& e) {
+                                   return e.weight < least &&
+                                          !(e.index < old_count &&
+                                            awaitsConfirmation(hypotheses_[slot(e.index)]));
+                                 }),
+                  entries.end());
   };
-  dropLight();
+  prune();
   if (limit > 0 && entries.size() > limit) {
     std::vector<Entry> ordered = entries;
     std::stable_sort(ordered.begin(), ordered.end(),
@@ -257,13 +257,13 @@ void Mixture::reweigh(int g, int f, std::vector<Child>& children, MatchStep& ste
     e.index = static_cast<int>(hypotheses_.size()) - 1;
   }
   if (!lives[slot(g)]) releaseEntries(hypotheses_[slot(g)]);
-  for (int k = 0; k < old_count && recounts(); ++k) {
-    if (lives[slot(k)] || aside_.size() >= kMostAside) continue;
+  for (int k = 0; k < old_count && rescoresJointly(); ++k) {
+    if (lives[slot(k)] || pruned_.size() >= kMaxPruned) continue;
     Hypothesis& dropped = hypotheses_[slot(k)];
     // The searcher itself is dropped for its own child: all but its last match lives on in that.
-    const bool is_runner_up = k != g && dropped.most_weight >= kRunnerUpWeight;
-    if (!is_runner_up && !lags(dropped)) continue;
-    aside_.push_back(std::move(dropped));
+    const bool is_alternative = k != g && dropped.most_weight >= kAlternativeWeight;
+    if (!is_alternative && !hasUnclaimedMatches(dropped)) continue;
+    pruned_.push_back(std::move(dropped));
     kept += weights[slot(k)];
   }
   kept_ *= kept;

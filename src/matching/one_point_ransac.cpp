@@ -42,7 +42,7 @@ Stacked stack(const ProperPrior& prior, const std::vector<int>& features,
 }
 
 /// Of all matches together from what the prior expects.
-double jointDistance2(const ProperPrior& prior, const SearchLedger& ledger,
+double jointDistance2(const ProperPrior& prior, const BudgetedSearch& budgeted,
                       const std::vector<int>& match_of_feature) {
   std::vector<int> matched;
   std::vector<Eigen::Vector2d> pixels;
@@ -50,7 +50,7 @@ double jointDistance2(const ProperPrior& prior, const SearchLedger& ledger,
     const int match = match_of_feature[static_cast<std::size_t>(prior.original(f))];
     if (match < 0) continue;
     matched.push_back(f);
-    pixels.push_back(ledger.matches(f)[static_cast<std::size_t>(match)].pixel);
+    pixels.push_back(budgeted.matches(f)[static_cast<std::size_t>(match)].pixel);
   }
   const Stacked all = stack(prior, matched, pixels);
   return all.S.llt().matrixL().solve(all.innovation).squaredNorm();
@@ -59,8 +59,8 @@ double jointDistance2(const ProperPrior& prior, const SearchLedger& ledger,
 /// One frame's problem: `best[f]` is the match of highest score in the prior's gate, or -1.
 class OnePointRansac {
  public:
-  OnePointRansac(const ProperPrior& prior, const SearchLedger& ledger, std::vector<int> best)
-      : prior_(prior), ledger_(ledger), best_(std::move(best)) {}
+  OnePointRansac(const ProperPrior& prior, const BudgetedSearch& budgeted, std::vector<int> best)
+      : prior_(prior), search_(budgeted), best_(std::move(best)) {}
 
   /// The low-innovation inliers of the best hypothesis.
   std::vector<int> inliers(const std::vector<int>& hypotheses, double limit2) const {
@@ -108,7 +108,7 @@ class OnePointRansac {
       double nearest = gate2;
       for (const int m : gates[slot]) {
         const double d2 =
-            mahalanobisSquared(conditional, ledger_.matches(f)[static_cast<std::size_t>(m)].pixel);
+            mahalanobisSquared(conditional, search_.matches(f)[static_cast<std::size_t>(m)].pixel);
         if (d2 > nearest || (rescued[slot] >= 0 && d2 == nearest)) continue;
         nearest = d2;
         rescued[slot] = m;
@@ -119,11 +119,11 @@ class OnePointRansac {
 
  private:
   const Eigen::Vector2d& bestPixel(int f) const {
-    return ledger_.matches(f)[static_cast<std::size_t>(best_[static_cast<std::size_t>(f)])].pixel;
+    return search_.matches(f)[static_cast<std::size_t>(best_[static_cast<std::size_t>(f)])].pixel;
   }
 
   const ProperPrior& prior_;
-  const SearchLedger& ledger_;
+  const BudgetedSearch& search_;
   std::vector<int> best_;
 };
 
@@ -132,17 +132,17 @@ class OnePointRansac {
 MatchResult OnePointRansacMatcher::match(const MeasurementPrior& given, FeatureSearch& search,
                                          const MatchOptions& options) {
   const ProperPrior prior(given);
-  SearchLedger ledger(prior, search, options);
-  MatchResult result = ledger.begin("one_point_ransac");
-  const auto gates = searchFullGates(prior, ledger, &result.statistics.cut_short);
+  BudgetedSearch budgeted(prior, search, options);
+  MatchResult result = budgeted.begin("one_point_ransac");
+  const auto gates = searchFullGates(prior, budgeted, &result.statistics.cut_short);
   std::vector<int> best, voters;
   for (int f = 0; f < prior.size(); ++f) {
-    best.push_back(bestScore(ledger.matches(f), gates[static_cast<std::size_t>(f)]));
+    best.push_back(bestScore(budgeted.matches(f), gates[static_cast<std::size_t>(f)]));
     if (best.back() >= 0) voters.push_back(f);
   }
   const std::vector<int> hypotheses = drawHypotheses(voters, options);
   result.statistics.nodes = static_cast<std::int64_t>(hypotheses.size());
-  const OnePointRansac ransac(prior, ledger, best);
+  const OnePointRansac ransac(prior, budgeted, best);
   const std::vector<int> inliers =
       ransac.inliers(hypotheses, options.ransac_inlier_chi2 * given.noise_variance_px2);
   result.statistics.inliers = static_cast<int>(inliers.size());
@@ -154,9 +154,9 @@ MatchResult OnePointRansacMatcher::match(const MeasurementPrior& given, FeatureS
     for (const int i : inliers)
       result.match_of_feature[static_cast<std::size_t>(prior.original(i))] =
           best[static_cast<std::size_t>(i)];
-    result.statistics.mahalanobis2 = jointDistance2(prior, ledger, result.match_of_feature);
+    result.statistics.mahalanobis2 = jointDistance2(prior, budgeted, result.match_of_feature);
   }
-  ledger.finish(result);
+  budgeted.finish(result);
   return result;
 }
 

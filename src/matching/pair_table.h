@@ -6,8 +6,8 @@
 
 namespace active_matching_slam {
 
-/// How a search in an ellipse looks from another Gaussian: its mass a inside, and the factors that
-/// a search without and with a match gives its weight (Chli 2009, eq. 5.13-5.17).
+/// A search in one Gaussian's ellipse as evidence for another Gaussian: its mass a inside, and the
+/// factors of its weight after a search without and with a match (Chli 2009, eq. 5.13-5.17).
 struct PairTerm {
   static constexpr double kUnknown = -1.0;
   double mass = kUnknown;
@@ -29,22 +29,22 @@ class PairTable {
   /// An entry with one user and no terms; kNone when all are taken.
   int acquire();
   /// kNone is allowed in both.
-  void share(int entry) {
+  void retain(int entry) {
     if (entry != kNone) ++users_[static_cast<std::size_t>(entry)];
   }
   void release(int entry) {
     if (entry != kNone) --users_[static_cast<std::size_t>(entry)];
   }
-  /// Tells an entry in use from a later one in its place; 0 when nobody uses it.
+  /// Distinguishes an entry in use from a later one in its place; 0 when it has no user.
   std::int64_t serial(int entry) const {
     return users_[static_cast<std::size_t>(entry)] > 0 ? serials_[static_cast<std::size_t>(entry)]
                                                        : 0;
   }
-  /// A search of the ellipse of `searcher` as `other` sees it.
+  /// A search of the ellipse of `searcher` as evidence for `other`.
   PairTerm& term(int other, int searcher) {
     return terms_[static_cast<std::size_t>(searcher) * stride_ + static_cast<std::size_t>(other)];
   }
-  /// The searcher's own view, in which a match adds nothing to it.
+  /// The same for the searcher itself, to which a match adds nothing (it goes to the child).
   PairTerm& own(int searcher) { return own_[static_cast<std::size_t>(searcher)]; }
 
  private:

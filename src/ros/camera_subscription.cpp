@@ -21,7 +21,7 @@ constexpr double kInfoDelay_s = 2.0;
 sensor_msgs::CameraInfoConstPtr readCameraInfo(const ros::NodeHandle& node,
                                                const std::string& url) {
   if (url.empty()) return nullptr;
-  // Lives only for the reading: the service it offers is the camera driver's business.
+  // Lives only while the file is read: the service it offers is the camera driver's business.
   camera_info_manager::CameraInfoManager manager(ros::NodeHandle(node, "camera_info_file"),
                                                  "camera", url);
   if (!manager.isCalibrated())
@@ -108,7 +108,7 @@ void CameraSubscription::deliver(CameraImage image) {
 
 void CameraSubscription::onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  // The same pointer for the same calibration: a comparison of pointers then tells of a change.
+  // The same pointer for the same calibration: a comparison of pointers then detects a change.
   if (!info_ || !sameCalibration(*info_, *info)) info_ = info;
 }
 

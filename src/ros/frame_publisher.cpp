@@ -16,7 +16,7 @@ constexpr int kPublisherQueueSize = 100;
 bool hasListener(const ros::Publisher& publisher) { return publisher.getNumSubscribers() > 0; }
 
 template <class Make>
-void publishIfHeard(const ros::Publisher& publisher, Make make) {
+void publishIfSubscribed(const ros::Publisher& publisher, Make make) {
   if (hasListener(publisher)) publisher.publish(make());
 }
 
@@ -98,11 +98,11 @@ void FramePublisher::publish(const TrackedFrame& frame, const FrameContext& cont
 
 void FramePublisher::publishPose(const FrameContext& context, const TrajectoryLog& trajectory) {
   const std_msgs::Header header = worldHeader(context.stamp);
-  publishIfHeard(pose_, [&] { return toPoseWithCovarianceMsg(*context.camera, header); });
+  publishIfSubscribed(pose_, [&] { return toPoseWithCovarianceMsg(*context.camera, header); });
   if (context.body)
-    publishIfHeard(odometry_,
-                   [&] { return toOdometryMsg(*context.body, header, context.body_frame); });
-  publishIfHeard(path_, [&] { return trajectory.path(options_.path_length, header); });
+    publishIfSubscribed(odometry_,
+                        [&] { return toOdometryMsg(*context.body, header, context.body_frame); });
+  publishIfSubscribed(path_, [&] { return trajectory.path(options_.path_length, header); });
 }
 
 void FramePublisher::publishMap(const TrackedFrame& frame, const FrameContext& context) {
@@ -110,13 +110,13 @@ void FramePublisher::publishMap(const TrackedFrame& frame, const FrameContext& c
   std_msgs::Header camera = world;
   camera.frame_id = context.camera_frame;
   const int level = options_.submap_level;
-  publishIfHeard(map_, [&] { return toPointCloudMsg(frame, level, world); });
-  publishIfHeard(features_, [&] { return toFeatureArrayMsg(frame, level, world); });
-  publishIfHeard(statistics_,
-                 [&] { return toStatisticsMsg(frame, context.dropped_images, camera); });
-  publishIfHeard(hypotheses_, [&] { return toHypothesesMsg(frame, camera); });
-  publishIfHeard(mutual_information_, [&] { return toGraphMsg(frame, world); });
-  publishIfHeard(submaps_, [&] { return toSubmapsMsg(frame, world); });
+  publishIfSubscribed(map_, [&] { return toPointCloudMsg(frame, level, world); });
+  publishIfSubscribed(features_, [&] { return toFeatureArrayMsg(frame, level, world); });
+  publishIfSubscribed(statistics_,
+                      [&] { return toStatisticsMsg(frame, context.dropped_images, camera); });
+  publishIfSubscribed(hypotheses_, [&] { return toHypothesesMsg(frame, camera); });
+  publishIfSubscribed(mutual_information_, [&] { return toGraphMsg(frame, world); });
+  publishIfSubscribed(submaps_, [&] { return toSubmapsMsg(frame, world); });
 }
 
 void FramePublisher::publishMarkers(const TrackedFrame& frame, const FrameContext& context,

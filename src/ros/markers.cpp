@@ -131,10 +131,10 @@ void addHull(const std::vector<Eigen::Vector3d>& points, const std_msgs::ColorRG
   if (points.size() < 2) return;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& point : points) center += point / points.size();
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d second_moment = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : points)
-    scatter += (point - center) * (point - center).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter);
+    second_moment += (point - center) * (point - center).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(second_moment);
   std::vector<cv::Point2f> flat;
   for (const Eigen::Vector3d& point : points) {
     const Eigen::Vector3d local = axes.eigenvectors().transpose() * (point - center);
@@ -211,14 +211,15 @@ MarkerArray informationMarkers(const TrackedFrame& frame, const DrawOptions& opt
     if (first == index.end() || second == index.end()) continue;
     const Eigen::Vector3d& from = frame.features[first->second].position_world;
     const Eigen::Vector3d& to = frame.features[second->second].position_world;
-    const double share = std::clamp(link.information_bits / strongest, 0.0, 1.0);
+    const double fraction = std::clamp(link.information_bits / strongest, 0.0, 1.0);
     if (link.in_tree) {
       addLine(&tree, from, to, color(1.0, 0.8, 0.2));
     } else {
-      const int c = std::min(kClasses - 1, static_cast<int>(share * kClasses));
+      const int c = std::min(kClasses - 1, static_cast<int>(fraction * kClasses));
       // From dim blue to white: no submap has such a colour.
       addLine(&classes[c], from, to,
-              color(0.3 + 0.7 * share, 0.45 + 0.55 * share, 0.8 + 0.2 * share, 0.15 + 0.4 * share));
+              color(0.3 + 0.7 * fraction, 0.45 + 0.55 * fraction, 0.8 + 0.2 * fraction,
+                    0.15 + 0.4 * fraction));
     }
   }
   for (Marker& marker : classes) keepIfAny(&markers, std::move(marker));
@@ -293,7 +294,7 @@ MarkerArray cameraMarkers(const TrackedFrame& frame, const CameraCalibration& ca
       addLine(&frustum, T_world_camera.translation(), corners[i], line_color);
       addLine(&frustum, corners[i], corners[(i + 1) % 4], line_color);
     }
-    // A roof over the upper edge tells which way is up.
+    // A roof over the upper edge marks which way is up.
     const Eigen::Vector3d roof = corner(0.5 * right, -0.25 * bottom);
     addLine(&frustum, corners[0], roof, line_color);
     addLine(&frustum, roof, corners[1], line_color);
@@ -336,7 +337,7 @@ void MarkerHistory::complete(const std_msgs::Header& header, MarkerArray* marker
       std::tie(deletion.ns, deletion.id) = shown->first;
       markers->markers.push_back(deletion);
     }
-    shown = age < kRepetitions ? std::next(shown) : last_shown_.erase(shown);
+    shown = age < kDeletionRepeats ? std::next(shown) : last_shown_.erase(shown);
   }
 }
 

@@ -8,6 +8,12 @@
 #include "active_matching_slam/ros/bound_options.h"
 
 namespace active_matching_slam {
+namespace {
+
+constexpr const char* kShuttingDown = "the tracker is shutting down";
+
+}  // namespace
+
 NodeSettings readNodeSettings(const ros::NodeHandle& private_node) {
   NodeSettings settings;
   XmlRpc::XmlRpcValue tree;
@@ -163,31 +169,31 @@ void TrackerRos::advertiseServices() {
 std::string TrackerRos::applyChanges(const std::vector<ReconfigureServer::Change>& changes) {
   NodeSettings next = settings_;
   const std::vector<BoundOption> options = bindOptions(&next.tracker, &next.node);
-  std::string error;
   try {
     for (const auto& change : changes)
       for (const BoundOption& option : options)
         if (option.name() == change.name) option.set(change.value);
     checkNodeOptions(next.node);
-    worker_->call([&] {
+    const bool is_done = worker_->call([&] {
       session_.setOptions(next.tracker);
       options_ = next.node;
       publisher_.setOptions(next.node);
       broadcaster_.setOptions(next.node);
     });
+    if (!is_done) return kShuttingDown;
   } catch (const std::exception& fault) {
     return fault.what();
   }
   settings_ = next;
   subscription_->setSilenceTimeout(next.node.no_image_timeout_s);
-  return error;
+  return {};
 }
 
 template <class Response>
 bool TrackerRos::answer(Response& response, const std::function<void()>& task) {
   try {
     response.success = worker_->call(task);
-    if (!response.success) response.message = "the tracker is shutting down";
+    if (!response.success) response.message = kShuttingDown;
   } catch (const std::exception& error) {
     response.success = false;
     response.message = error.what();

@@ -32,8 +32,8 @@ void addHandNoise(HarmonicSum& sum, double rms_velocity, double low_hz, double h
                   Random& random) {
   constexpr int kTerms = 7;
   for (int i = 0; i < kTerms; ++i) {
-    const double share = (i + random.uniform()) / kTerms;
-    const double rate = 2.0 * M_PI * low_hz * std::pow(high_hz / low_hz, share);
+    const double fraction = (i + random.uniform()) / kTerms;
+    const double rate = 2.0 * M_PI * low_hz * std::pow(high_hz / low_hz, fraction);
     sum.add(rms_velocity * std::sqrt(2.0 / kTerms) / rate, rate, random.uniform(0.0, 2.0 * M_PI));
   }
 }

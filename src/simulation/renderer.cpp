@@ -119,18 +119,18 @@ float bilinear(const std::uint16_t* texels, int stride, float u, float v) {
 template <typename Texture>
 float sampleTexture(const Texture& texture, float u, float v, float lod) {
   const int level = static_cast<int>(lod);
-  const float share = lod - static_cast<float>(level);
+  const float fraction = lod - static_cast<float>(level);
   u = std::min(std::max(u, 0.0f), texture.columns);
   v = std::min(std::max(v, 0.0f), texture.rows);
   const auto& fine = texture.levels[level];
   // Texel centres are at halves, and the border shifts by one.
   const float value =
       bilinear(fine.texels.data(), fine.stride, u * fine.scale_u + 0.5f, v * fine.scale_v + 0.5f);
-  if (share <= 0.0f) return value;
+  if (fraction <= 0.0f) return value;
   const auto& coarse = texture.levels[level + 1];
-  return value + share * (bilinear(coarse.texels.data(), coarse.stride, u * coarse.scale_u + 0.5f,
-                                   v * coarse.scale_v + 0.5f) -
-                          value);
+  return value + fraction * (bilinear(coarse.texels.data(), coarse.stride,
+                                      u * coarse.scale_u + 0.5f, v * coarse.scale_v + 0.5f) -
+                             value);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kQuantileBits = 12;
 constexpr double kMidGrey = 128.0;
-constexpr double kConstantShare = 1.0 / 3.0;
+constexpr double kConstantFraction = 1.0 / 3.0;
 
 /// Quantile of the standard normal distribution, by bisection.
 double normalQuantile(double probability) {
@@ -44,7 +44,7 @@ Sensor::Sensor(int width, int height, double noise, double vignetting) : noise_(
 
 double Sensor::noiseAt(double grey) const {
   return noise_ *
-         std::sqrt(kConstantShare + (1.0 - kConstantShare) * std::max(grey, 0.0) / kMidGrey);
+         std::sqrt(kConstantFraction + (1.0 - kConstantFraction) * std::max(grey, 0.0) / kMidGrey);
 }
 
 void Sensor::expose(const cv::Mat& radiance, double gain, std::uint64_t seed,

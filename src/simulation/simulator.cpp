@@ -131,9 +131,9 @@ std::optional<SimulatedFrame> Simulator::next() {
   sensor_.expose(radiance_, frame.gain, Random(options_.seed).fork(frame.index).next(),
                  frame.image);
   if (options_.auto_exposure) {
-    const double share = 1.0 - std::exp(-1.0 / (options_.rate_hz * kExposureLagS));
+    const double fraction = 1.0 - std::exp(-1.0 / (options_.rate_hz * kExposureLagS));
     gain_ =
-        std::clamp(gain_ * std::pow(kTargetMean / (gain_ * mean), share), kLeastGain, kMostGain);
+        std::clamp(gain_ * std::pow(kTargetMean / (gain_ * mean), fraction), kLeastGain, kMostGain);
   }
   return frame;
 }

@@ -88,7 +88,7 @@ void printTables() {
   const std::string head =
       "| parameter | default | range | live | meaning |\n|---|---|---|---|---|\n";
   std::cout << "The tracker, in the node and in `track_bag`:\n\n" << head;
-  const TrackerOptions tracker = liveTrackerOptions();
+  const TrackerOptions tracker;
   visitOptions(tracker, TableRow());
   std::cout << "\nThe node alone:\n\n" << head;
   const NodeOptions node;
@@ -101,7 +101,7 @@ void printTrackerYaml() {
          "# track_bag --config. A file need only hold what differs. m stands for the map unit\n"
          "# while the scale is free.\n\n";
   std::string group;
-  const TrackerOptions options = liveTrackerOptions();
+  const TrackerOptions options;
   visitOptions(options, YamlLine{&group});
 }
 

@@ -23,18 +23,18 @@ namespace po = boost::program_options;
 using Bins = std::vector<ReliabilityBin>;
 
 void printTable(const Bins& bins) {
-  std::printf("%8s %12s %12s %10s\n", "frames", "mean weight", "share right", "sigma");
+  std::printf("%8s %12s %16s %10s\n", "frames", "mean weight", "fraction correct", "sigma");
   for (const ReliabilityBin& bin : bins)
     if (bin.frames > 0)
-      std::printf("%8d %12.3f %12.3f %10.3f\n", bin.frames, bin.mean_weight, bin.share_right,
+      std::printf("%8d %12.3f %16.3f %10.3f\n", bin.frames, bin.mean_weight, bin.fraction_correct,
                   bin.sigma);
 }
 
 void writeCsv(const Bins& bins, const std::string& path) {
   std::ofstream file(path);
-  file << "frames,mean_weight,share_right,sigma\n";
+  file << "frames,mean_weight,fraction_correct,sigma\n";
   for (const ReliabilityBin& bin : bins)
-    file << bin.frames << ',' << bin.mean_weight << ',' << bin.share_right << ',' << bin.sigma
+    file << bin.frames << ',' << bin.mean_weight << ',' << bin.fraction_correct << ',' << bin.sigma
          << '\n';
   if (!file.flush()) throw std::runtime_error(path + ": cannot be written");
 }
@@ -44,11 +44,11 @@ void writePlot(const Bins& bins, const std::string& title, const std::string& pa
   const cv::Scalar grey(150, 150, 150), blue(180, 90, 20);
   cv::Mat image(kTop + kSide + 60, kLeft + kSide + 30, CV_8UC3, cv::Scalar(255, 255, 255));
   PlotCanvas canvas(&image, cv::Rect(kLeft, kTop, kSide, kSide), {0.5, 0.5}, kSide / 1.1);
-  canvas.drawGrid("weight of the accepted hypothesis", "share right", title);
+  canvas.drawGrid("weight of the accepted hypothesis", "fraction correct", title);
   canvas.polyline({{0.0, 0.0}, {1.0, 1.0}}, grey, 1);
   for (const ReliabilityBin& bin : bins) {
     if (bin.frames == 0) continue;
-    const Eigen::Vector2d point(bin.mean_weight, bin.share_right), bar(0.0, 2.0 * bin.sigma);
+    const Eigen::Vector2d point(bin.mean_weight, bin.fraction_correct), bar(0.0, 2.0 * bin.sigma);
     canvas.polyline({point - bar, point + bar}, blue, 1);
     canvas.dot(point, 4.0, blue);
   }
@@ -74,7 +74,7 @@ int run(int argc, char** argv) {
     std::cout
         << options
         << "Prints, by weight of the accepted hypothesis, how often it was right. 'sigma' is\n"
-           "the standard deviation of that share if the weights are probabilities.\n";
+           "the standard deviation of that fraction if the weights are probabilities.\n";
     return 0;
   }
   po::notify(values);

@@ -6,8 +6,11 @@
 namespace active_matching_slam {
 namespace {
 
-/// The features' own ways, where they differ, pull the image's motion along by up to this share.
-constexpr double kShareOfSpread = 0.5;
+/// Standard deviation of the image's motion for the mean of the features' motions, in the standard
+/// deviation of these: what fills most of the image moves its alignment more than the mean.
+/// Derivation: where half of the image moves by one motion and half by another, the alignment takes
+/// either, each one standard deviation off the mean; half of that is between this and none.
+constexpr double kSpreadFraction = 0.5;
 
 }  // namespace
 
@@ -27,25 +30,25 @@ ImageMotion predictedImageMotion(const MeasurementPrior& prior,
 MeasurementPrior conditionOnImageMotion(
     const MeasurementPrior& prior, const std::vector<std::optional<Eigen::Vector2d>>& before_px,
     const ImageMotion& motion) {
-  std::vector<int> seen;
+  std::vector<int> visible;
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   for (int i = 0; i < prior.size(); ++i) {
     if (!before_px[i]) continue;
-    seen.push_back(i);
+    visible.push_back(i);
     centre += prior.mean(i);
   }
-  const auto n = static_cast<double>(seen.size());
-  if (seen.size() < 3) return prior;
+  const auto n = static_cast<double>(visible.size());
+  if (visible.size() < 3) return prior;
   centre /= n;
   double squared_radius = 0.0;  // mean
-  for (const int i : seen) squared_radius += (prior.mean(i) - centre).squaredNorm() / n;
+  for (const int i : visible) squared_radius += (prior.mean(i) - centre).squaredNorm() / n;
   const double radius = std::sqrt(squared_radius);
   if (!(radius > 0.0)) return prior;
 
   // Rows of A: shift u, shift v, turn times radius. The columns of B are what they do to a point.
   Eigen::Matrix3Xd A = Eigen::Matrix3Xd::Zero(3, prior.z.size());
   Eigen::VectorXd off = Eigen::VectorXd::Zero(prior.z.size());
-  for (const int i : seen) {
+  for (const int i : visible) {
     const Eigen::Vector2d arm = (prior.mean(i) - centre) / radius;
     Eigen::Matrix<double, 2, 3> B;
     B << 1.0, 0.0, -arm.y(), 0.0, 1.0, arm.x();
@@ -55,7 +58,7 @@ MeasurementPrior conditionOnImageMotion(
   const Eigen::Vector3d common = A * off;
   const double spread = (off - n * A.transpose() * common).squaredNorm() / (2.0 * n);
   const double variance =
-      motion.sigma_px * motion.sigma_px + kShareOfSpread * kShareOfSpread * spread;
+      motion.sigma_px * motion.sigma_px + kSpreadFraction * kSpreadFraction * spread;
 
   Eigen::MatrixXd P = prior.S;  // without the noise of a match
   P.diagonal().array() -= prior.noise_variance_px2;

@@ -12,8 +12,10 @@
 namespace active_matching_slam {
 namespace {
 
+/// Root mean square residual of a camera that explains the points. Cost: responses within a
+/// corner's localisation error pass; beyond it a wrong combination would start a wrong scale.
 constexpr double kMaximumReprojectionPx = 2.0;
-constexpr std::size_t kMaximumCombinations = 4096;
+constexpr std::size_t kMaximumCombinations = 4096;  ///< Cost: each takes a pose by PnP
 
 struct Response {
   Eigen::Vector2d pixel;
@@ -93,9 +95,10 @@ bool areCoplanar(const std::vector<KnownPoint>& points) {
   Eigen::MatrixXd offsets(3, points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
     offsets.col(i) = points[i].position_m - points[0].position_m;
-  const Eigen::Matrix3d scatter = offsets * offsets.transpose();
+  const Eigen::Matrix3d covariance = offsets * offsets.transpose();
   const Eigen::Vector3d spread =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance, Eigen::EigenvaluesOnly)
+          .eigenvalues();
   return spread(0) < 1e-6 * spread(2);
 }
 
@@ -175,7 +178,7 @@ std::optional<KnownStart> findKnownStart(const cv::Mat& image, const CameraModel
       cost += 1.0 - responses[i][choice[i]].score;
     }
     const KnownStart start = solve(camera, points, pixels);
-    // A pixel of misfit weighs as much as half the range of one score.
+    // A pixel of residual weighs as much as half the range of one score.
     cost += start.reprojection_rms_px;
     if (cost < best_cost) {
       best_cost = cost;

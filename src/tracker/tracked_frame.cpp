@@ -1,6 +1,7 @@
 #include "active_matching_slam/tracker/tracked_frame.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "active_matching_slam/information/gaussian_information.h"
 #include "tracker_implementation.h"
@@ -58,7 +59,8 @@ std::unordered_map<FeatureId, double> predictedInformationBits(const TrackedFram
   return bits_of;
 }
 
-void Tracker::Implementation::describe(TrackedFrame* frame) const {
+/// The state of the tracker, of which every frame gives an account.
+void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->scale_source = scale_source_;
   frame->camera = filter_.camera();
   frame->camera_covariance = filter_.cameraCovariance();
@@ -86,20 +88,27 @@ void Tracker::Implementation::describe(TrackedFrame* frame) const {
     out.matched_px.setZero();
     frame->features.push_back(out);
   }
-  if (frame->matching.match_of_feature.empty()) return;
-  frame->prior = prior_;
-  frame->templates = templates_;
+}
+
+/// What was predicted, searched and matched. After describeState().
+void Tracker::Implementation::describeMatches(FrameState current, TrackedFrame* frame) {
+  frame->matching = std::move(current.matching);
+  if (current.prior.size() == 0) return;
+  frame->prior = std::move(current.prior);
+  frame->templates = std::move(current.templates);
+  for (int i = 0; i < frame->prior.size(); ++i) frame->matches.push_back(current.search.matches(i));
   std::size_t next = 0;
-  for (int i = 0; i < prior_.size(); ++i) {
-    const bool used = next < fused_.size() && fused_[next].id == prior_.ids[i];
-    const Eigen::Vector2d pixel = used ? fused_[next].pixel : Eigen::Vector2d::Zero();
-    if (used) ++next;
+  for (int i = 0; i < frame->prior.size(); ++i) {
+    const bool used = next < current.inliers.size() && current.inliers[next] == i;
+    const Eigen::Vector2d pixel =
+        used ? current.measurements[next++].pixel : Eigen::Vector2d::Zero();
+    const FeatureId id = frame->prior.ids[i];
     const auto it =
-        std::lower_bound(frame->features.begin(), frame->features.end(), prior_.ids[i],
+        std::lower_bound(frame->features.begin(), frame->features.end(), id,
                          [](const TrackedFeature& f, FeatureId id) { return f.id < id; });
-    if (it == frame->features.end() || it->id != prior_.ids[i]) continue;  // retired by now
-    it->predicted_px = prior_.mean(i);
-    it->innovation_covariance_px2 = prior_.covariance(i);
+    if (it == frame->features.end() || it->id != id) continue;  // retired by now
+    it->predicted_px = frame->prior.mean(i);
+    it->innovation_covariance_px2 = frame->prior.covariance(i);
     const auto& matches = frame->matches[i];
     if (used) {
       it->status = FeatureStatus::kMatched;
@@ -113,8 +122,8 @@ void Tracker::Implementation::describe(TrackedFrame* frame) const {
       it->matched_px = best->pixel;
       it->score = best->score;
     } else {
-      it->status = search_.searchedPixels(i).size() > 0 ? FeatureStatus::kMissed
-                                                        : FeatureStatus::kNotSearched;
+      it->status = current.search.searchedPixels(i).size() > 0 ? FeatureStatus::kMissed
+                                                               : FeatureStatus::kNotSearched;
     }
   }
 }

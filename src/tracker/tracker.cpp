@@ -2,8 +2,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "active_matching_slam/image/image_quality.h"
 #include "active_matching_slam/tracker/option_fields.h"
@@ -37,7 +39,7 @@ void Tracker::Implementation::reset(const std::string& reason) {
   structure_.clear();
   structure_snapshot_ = {};
   filter_.reset(CameraState(), MotionCovariance::Zero());
-  match_noise_.reset();
+  noise_.reset();
   scale_source_ = ScaleSource::kFree;
   previous_image_.release();
   poor_frames_ = 0;
@@ -51,11 +53,10 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
     throw std::invalid_argument(
         "image/template_size_px and image/source_patch_size_px can't change "
         "while a map is kept");
-  if (options.matcher != options_.matcher) matcher_ = createMatcher(options.matcher);
+  cascade_.setMatcher(options.matcher);
   filter_.setOptions(withTrustIn(camera_.calibration(), options.filter));
+  noise_.setOptions(options.filter);
   relocaliser_ = Relocaliser({}, options.map, options.image);
-  search_ = ImageFeatureSearch(options.image);
-  second_search_ = ImageFeatureSearch(options.image);
   options_ = options;
 }
 
@@ -65,7 +66,7 @@ void Tracker::Implementation::setScale(double factor) {
   filter_.rescale(factor);
   map_.rescale(factor);
   initialiser_.rescale(factor);
-  T_world_camera_before_.translation() *= factor;
+  T_world_reference_.translation() *= factor;
   scale_source_ = ScaleSource::kService;
 }
 
@@ -97,23 +98,25 @@ bool Tracker::Implementation::accept(const cv::Mat& image, double stamp_s, Track
 }
 
 /// The usual way of an image, once the state is predicted.
-void Tracker::Implementation::follow(const cv::Mat& image, TrackedFrame* frame) {
+FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval_s,
+                                           TrackedFrame* frame) {
   StopWatch stage;
-  measure(image);
+  FrameState current = measure(image, interval_s);
   frame->timings_ms.measure = stage.lap();
-  if (options_.structure) observeStructure();
+  if (options_.structure) observeStructure(current.visible);
   frame->timings_ms.structure = stage.lap();
-  match(image, frame);
+  cascade_.match(options_.matching, options_.fallback_matchers, &current);
   frame->timings_ms.match = stage.lap();
-  correct(image, frame);
-  const bool is_restarted = initialise(image, frame);
+  correct(&current, frame);
+  const bool is_restarted = initialise(current, frame);
   frame->timings_ms.update = stage.lap();
-  if (is_restarted || giveUpWrongMap(image, frame)) return;
-  judge();
+  if (is_restarted || giveUpWrongMap(current, frame)) return current;
+  updateTrackingState(current);
   maintainMap(image, frame);
   frame->timings_ms.map = stage.lap();
   if (options_.structure) updateStructure(frame);
   frame->timings_ms.structure += stage.lap();
+  return current;
 }
 
 std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat& image,
@@ -124,7 +127,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   frame->index = images_++;
   if (!accept(image, stamp_s, frame.get())) {
     frame->state = state_;
-    describe(frame.get());
+    describeState(frame.get());
     return frame;
   }
   camera_ = camera_.corrected(filter_.camera().lens);
@@ -132,29 +135,32 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   frame->repeated_image = !previous_image_.empty() && isRepeatedImage(image, previous_image_);
   last_stamp_s_ = stamp_s;
 
+  std::optional<FrameState> current;
   if (state_ == TrackingState::kWaiting || state_ == TrackingState::kInitialising) {
     start(image, frame.get());
     state_stamp_s_ = stamp_s;
   } else if (state_ == TrackingState::kLost) {
     predict(stamp_s - state_stamp_s_);
     state_stamp_s_ = stamp_s;
-    relocalise(image, frame.get());
+    relocaliseWhileLost(image, frame.get());
   } else if (!frame->repeated_image) {
-    interval_s_ = stamp_s - state_stamp_s_;
+    const double interval_s = stamp_s - state_stamp_s_;
     state_stamp_s_ = stamp_s;
-    predict(interval_s_);
+    predict(interval_s);
     frame->timings_ms.predict = stage.lap();
-    // Over a long gap, or when nothing has been where it should be for a while, the prediction says
-    // next to nothing: the whole image is asked first.
-    const bool is_gap = interval_s_ > options_.max_frame_interval_s;
-    const bool is_astray = poor_frames_ > 0 && poor_frames_ % kFramesBetweenLooks == 0;
-    if (!(is_gap || is_astray) || !findInMap(image, frame.get())) follow(image, frame.get());
+    // Over a long gap, or when too little has matched for a while, the prediction is next to
+    // worthless: the whole image is searched for the map first.
+    const bool is_due = interval_s > options_.max_frame_interval_s ||
+                        (poor_frames_ > 0 && poor_frames_ % kRelocalisationPeriodFrames == 0);
+    if (!is_due || !relocalise(image, frame.get()))
+      current.emplace(follow(image, interval_s, frame.get()));
   }
   previous_image_ = image.clone();  // the caller may use its memory again
-  if (poor_frames_ == 0) image_before_ = previous_image_;
+  if (poor_frames_ == 0) reference_image_ = previous_image_;
   frame->state = state_;
   if (!reason_.empty()) frame->reason = reason_;
-  describe(frame.get());
+  describeState(frame.get());
+  if (current) describeMatches(std::move(*current), frame.get());
   frame->timings_ms.total = total.lap();
   return frame;
 }

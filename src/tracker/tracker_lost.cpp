@@ -8,29 +8,32 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kFoundSigmaPosition = 0.2;  ///< of a place found again, in scene depths
-constexpr double kFoundSigmaRotation = 0.1;  ///< [rad]
+/// Prior of a relocalised camera: position in mean depths of the inliers, rotation [rad].
+/// Derivation: vague, ten times and more what inliers of some pixels leave open (about 1 % of the
+/// depth, 0.01 rad), so that the update by the inliers determines the pose.
+constexpr double kRelocalisedSigmaPosition = 0.2, kRelocalisedSigmaRotation = 0.1;
 
 }  // namespace
 
 /// Starts anew when the map has turned out wrong.
-bool Tracker::Implementation::giveUpWrongMap(const cv::Mat& image, TrackedFrame* frame) {
-  if (frame->matching.statistics.cut_short) return false;  // not all was looked for
-  map_monitor_.add(last_stamp_s_, prior_.size(), static_cast<int>(fused_.size()),
-                   measureImageQuality(image).sharpness);
+bool Tracker::Implementation::giveUpWrongMap(const FrameState& current, TrackedFrame* frame) {
+  if (current.matching.statistics.cut_short) return false;  // not all was looked for
+  map_monitor_.add(last_stamp_s_, current.prior.size(),
+                   static_cast<int>(current.measurements.size()),
+                   measureImageQuality(current.image).sharpness);
   if (!map_monitor_.isWrong()) return false;
   const std::string reason =
       "the map is wrong: half of what it predicts does not match in images as sharp as ever; "
       "started anew";
   reset(reason);
-  start(image, frame);
+  start(current.image, frame);
   frame->reason = reason;
   return true;
 }
 
 /// Decides whether the camera is still tracked.
-void Tracker::Implementation::judge() {
-  const int matched = static_cast<int>(fused_.size());
+void Tracker::Implementation::updateTrackingState(const FrameState& current) {
+  const int matched = static_cast<int>(current.measurements.size());
   if (matched >= options_.minimum_matches) {
     poor_frames_ = 0;
     state_ = TrackingState::kTracking;
@@ -39,8 +42,8 @@ void Tracker::Implementation::judge() {
   }
   ++poor_frames_;
   std::ostringstream reason;
-  reason << matched << " of " << prior_.size() << " features matched, " << options_.minimum_matches
-         << " are needed";
+  reason << matched << " of " << current.prior.size() << " features matched, "
+         << options_.minimum_matches << " are needed";
   reason_ = reason.str();
   if (poor_frames_ >= options_.lost_after_frames && state_ != TrackingState::kLost) {
     lose(reason_);
@@ -63,7 +66,7 @@ void Tracker::Implementation::lose(const std::string& reason) {
 }
 
 /// What becomes of an image while the camera is lost.
-void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
+void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame) {
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
   // Lost soon after the start: nothing is known but directions.
   if (!relocaliser_.canFind(filter_, map_)) {
@@ -76,12 +79,12 @@ void Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* fra
     reset(reason.str());
     return;
   }
-  if (frame->index % kFramesBetweenLooks == 0) findInMap(image, frame);
+  if (frame->index % kRelocalisationPeriodFrames == 0) relocalise(image, frame);
 }
 
-/// Looks for the camera in the whole map by one whole image. False when it is not found; the state
-/// is then as before.
-bool Tracker::Implementation::findInMap(const cv::Mat& image, TrackedFrame* frame) {
+/// Searches the whole image for the whole map. False when the camera is not found; the state is
+/// then as before.
+bool Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
   const auto found = relocaliser_.find(camera_, image, filter_, map_);
   if (!found) return false;
   CameraState camera;
@@ -91,8 +94,8 @@ bool Tracker::Implementation::findInMap(const cv::Mat& image, TrackedFrame* fram
     depth += (filter_.find(inlier.id)->position() - camera.position_world).norm();
   depth /= static_cast<double>(found->inliers.size());
   Eigen::Matrix<double, 12, 1> sigma;
-  sigma << Eigen::Vector3d::Constant(kFoundSigmaPosition * depth),
-      Eigen::Vector3d::Constant(kFoundSigmaRotation),
+  sigma << Eigen::Vector3d::Constant(kRelocalisedSigmaPosition * depth),
+      Eigen::Vector3d::Constant(kRelocalisedSigmaRotation),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
   filter_.relocateCamera(camera, sigma.array().square().matrix().asDiagonal());

@@ -7,9 +7,17 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kMostStartsPerFrame = 12;  ///< after the first image
-/// The structure of a map beyond is made anew every few frames only.
+/// Features started in one image after the first. Cost: each adds a correlation with all the state.
+constexpr int kMaximumStartsPerFrame = 12;
+/// Tree and submaps of a map of more features are made anew only every so many frames. Cost: they
+/// take the square of the number of features.
 constexpr int kLargeMap = 60, kLargeMapSnapshotFrames = 5;
+/// Relative standard deviation of an inverse depth below which it counts as known. Derivation:
+/// infinity is five sigma away.
+constexpr double kKnownDepthSigma = 0.2;
+/// Whose median inverse depth a new feature takes. Derivation: the fewest whose median two outliers
+/// can't move away.
+constexpr std::ptrdiff_t kNeighbours = 5;
 
 }  // namespace
 
@@ -25,27 +33,29 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   retire(map_.failing(options_.map), frame);
   retire(map_.drifting(), frame);
   // The maximum may have been lowered.
-  retire(map_.leastInformative(filter_, map_.size() - options_.map.maximum_features), frame);
+  retire(map_.leastUseful(filter_, map_.size() - options_.map.maximum_features), frame);
   if (poor_frames_ > 0) return;  // where the camera is unsure, nothing new is put on the map
-  visible_ = map_.visible(filter_, camera_, options_.map, options_.image.border_px);
+  const std::vector<VisibleFeature> visible =
+      map_.visible(filter_, camera_, options_.map, options_.image.border_px);
   const int wanted =
-      options_.map.features_per_frame - static_cast<int>(map_.expectedMatches(visible_));
+      options_.map.features_per_frame - static_cast<int>(map_.expectedMatches(visible));
   if (wanted <= 0) return;
   const int excess =
-      map_.size() + std::min(wanted, kMostStartsPerFrame) - options_.map.maximum_features;
-  if (excess > 0) retire(map_.leastInformative(filter_, excess), frame);
-  frame->features_started += startFeatures(image, std::min(wanted, kMostStartsPerFrame), frame);
+      map_.size() + std::min(wanted, kMaximumStartsPerFrame) - options_.map.maximum_features;
+  if (excess > 0) retire(map_.leastUseful(filter_, excess), frame);
+  frame->features_started +=
+      startFeatures(image, visible, std::min(wanted, kMaximumStartsPerFrame), frame);
 }
 
 /// Adds the frame to the graph of mutual information: all that is predicted visible. What was
 /// chosen to be measured is spread over the image, and would leave out the links between
-/// neighbours. It is a prediction of its own, so that whether anyone looks at the graph changes no
-/// bit of the measurements.
-void Tracker::Implementation::observeStructure() {
+/// neighbours. It is a prediction of its own, so that whether the graph is made changes no bit
+/// of the measurements.
+void Tracker::Implementation::observeStructure(const std::vector<VisibleFeature>& visible) {
   std::vector<FeatureId> ids;
-  for (const VisibleFeature& feature : visible_) ids.push_back(feature.id);
+  for (const VisibleFeature& feature : visible) ids.push_back(feature.id);
   const PredictedMeasurements predicted =
-      filter_.predictMeasurements(camera_, ids, options_.structure_accelerations);
+      filter_.predictMeasurements(camera_, ids, 0.0, options_.structure_accelerations);
   structure_.addFrame(predicted.ids, predicted.S);
 }
 
@@ -62,15 +72,16 @@ void Tracker::Implementation::updateStructure(TrackedFrame* frame) {
   frame->submaps = structure_snapshot_.submaps;
 }
 
-/// Direction and inverse depth, in the camera, of what is seen now and of known depth.
-std::vector<Tracker::Implementation::DepthSample> Tracker::Implementation::knownDepths() const {
+/// Direction and inverse depth, in the camera, of visible features of known depth.
+std::vector<Tracker::Implementation::DepthSample> Tracker::Implementation::knownDepths(
+    const std::vector<VisibleFeature>& visible) const {
   std::vector<DepthSample> known;
   const Eigen::Isometry3d T_camera_world = filter_.camera().poseWorldCamera().inverse();
-  for (const VisibleFeature& feature : visible_) {
+  for (const VisibleFeature& feature : visible) {
     const FeatureState* state = filter_.find(feature.id);
     if (!state) continue;
     if (state->kind == FeatureKind::kInverseDepth &&
-        filter_.sigmaInverseDepth(*state) > 0.2 * state->inverse_depth)
+        filter_.sigmaInverseDepth(*state) > kKnownDepthSigma * state->inverse_depth)
       continue;
     const Eigen::Vector3d point = T_camera_world * state->position();
     known.push_back({point.normalized(), 1.0 / point.norm()});
@@ -78,11 +89,10 @@ std::vector<Tracker::Implementation::DepthSample> Tracker::Implementation::known
   return known;
 }
 
-/// Median inverse depth of the neighbours of a new feature, so that it says nothing new about
-/// scale, near something and far from it alike; the options' prior while nothing is known.
+/// Median inverse depth of the neighbours of a new feature, so that it does not pull the scale,
+/// near something and far from it alike; the options' prior while nothing is known.
 double Tracker::Implementation::depthPrior(const Eigen::Vector2d& pixel,
                                            std::vector<DepthSample> known) const {
-  constexpr std::ptrdiff_t kNeighbours = 5;
   const auto ray = camera_.unproject(pixel);
   if (!ray || known.size() < kNeighbours) return options_.filter.initial_inverse_depth;
   std::nth_element(known.begin(), known.begin() + (kNeighbours - 1), known.end(),
@@ -95,7 +105,9 @@ double Tracker::Implementation::depthPrior(const Eigen::Vector2d& pixel,
   return known[kNeighbours / 2].inverse_depth;
 }
 
-int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, TrackedFrame* frame) {
+int Tracker::Implementation::startFeatures(const cv::Mat& image,
+                                           const std::vector<VisibleFeature>& visible, int wanted,
+                                           TrackedFrame* frame) {
   wanted = std::min(wanted, options_.map.maximum_features - map_.size());
   if (wanted <= 0) return 0;
   std::vector<Eigen::Vector2d> occupied;
@@ -109,7 +121,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
   }
   const auto& fixed = initialiser_.imageFixedPixels();
   occupied.insert(occupied.end(), fixed.begin(), fixed.end());
-  const std::vector<DepthSample> known_depths = knownDepths();
+  const std::vector<DepthSample> known_depths = knownDepths(visible);
   const double relative_sigma =
       options_.filter.initial_sigma_inverse_depth / options_.filter.initial_inverse_depth;
   int started = 0;
@@ -121,9 +133,9 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image, int wanted, Tra
     if (!patch) continue;
     const double inverse_depth = depthPrior(corner.pixel, known_depths);
     MapFeature feature;
-    feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
-                                                relative_sigma * inverse_depth,
-                                                match_noise_.sigma_px(options_.filter));
+    feature.id =
+        filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
+                                       relative_sigma * inverse_depth, noise_.typicalSigma_px());
     if (feature.id < 0) continue;
     first_sights.push_back({feature.id, corner.pixel, 0.0});
     feature.patch = std::move(*patch);

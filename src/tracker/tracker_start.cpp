@@ -9,9 +9,9 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kStartSigmaPosition = 1e-4;  ///< the start defines the world [m]
-constexpr double kStartSigmaRotation = 1e-4;  ///< [rad]
-constexpr double kKnownPointSigma = 5e-4;     ///< how well a known point is known [m]
+/// Standard deviation of the first camera, which is the world's frame. Derivation: 0, but that the
+/// covariance stays positive definite [m, rad].
+constexpr double kStartSigmaPosition = 1e-4, kStartSigmaRotation = 1e-4;
 
 }  // namespace
 
@@ -34,11 +34,10 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
     filter_.reset(CameraState(), sigma.array().square().matrix().asDiagonal());
     scale_source_ = ScaleSource::kFree;
   }
-  visible_.clear();
-  // Pose and covariance are told with respect to this image: it gives all the corners that it has,
-  // of which each look at it finds one a cell.
+  // Pose and covariance are relative to this image: it gives all the corners that it has, of which
+  // each detection finds one a cell.
   for (int started = 1; started > 0; frame->features_started += started)
-    started = startFeatures(image, options_.map.features_per_frame - map_.size(), frame);
+    started = startFeatures(image, {}, options_.map.features_per_frame - map_.size(), frame);
   initialiser_.end();
   if (options_.known_points.empty()) {
     filter_.fixScale(Ekf::kFreeScaleSigma);
@@ -58,20 +57,21 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
   poor_frames_ = 0;
 }
 
-/// Lets the first images, taken together, correct what the filter made of them one by one.
-/// True when the image became the first instead.
-bool Tracker::Implementation::initialise(const cv::Mat& image, TrackedFrame* frame) {
+/// Lets the first images, taken together, correct what the filter made of them one by one. True
+/// when this image became the first instead.
+bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame* frame) {
   if (initialiser_.isDone()) return false;
-  initialiser_.add(camera_.corrected({}), {frame->index, last_stamp_s_, fused_}, filter_);
+  const CameraModel calibrated = camera_.corrected({});
+  initialiser_.add(calibrated, {frame->index, last_stamp_s_, current.measurements}, filter_);
   if (initialiser_.isFirstUnrelated()) {
-    start(image, frame);
+    start(current.image, frame);
     ++resets_;
     frame->reason = "the first image has nothing to do with the second: started anew from it";
     return true;
   }
-  const auto initial = initialiser_.step(camera_.corrected({}), filter_);
+  const auto initial = initialiser_.step(calibrated, filter_);
   if (!initial) return false;
-  std::vector<FeatureId> dropped;  // seen too rarely to take part
+  std::vector<FeatureId> dropped;  // too few measurements to take part
   auto kept = initial->features.begin();
   for (const MapFeature& feature : map_.features()) {
     if (kept != initial->features.end() && kept->id == feature.id) {
@@ -98,19 +98,20 @@ bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, Tracked
   }
   CameraState camera;
   camera.setPoseWorldCamera(found->T_world_camera);
-  // The pose is linearised at its solution and all but free: the points alone determine it below.
+  // The pose is linearised at its solution and all but free (as far off as the target is, and a
+  // tenth of a metre for one that is very near): the points alone determine it below.
   const double distance = camera.position_world.norm() + 0.1;
   Eigen::Matrix<double, 12, 1> sigma;
   sigma << Eigen::Vector3d::Constant(distance), Eigen::Vector3d::Constant(1.0),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
   filter_.reset(camera, sigma.array().square().matrix().asDiagonal());
+  const double variance_m2 = options_.known_points_sigma_m * options_.known_points_sigma_m;
   std::vector<FeatureMeasurement> measurements;
   for (std::size_t i = 0; i < options_.known_points.size(); ++i) {
     MapFeature feature;
-    feature.id =
-        filter_.addPointFeature(options_.known_points[i].position_m,
-                                kKnownPointSigma * kKnownPointSigma * Eigen::Matrix3d::Identity());
+    feature.id = filter_.addPointFeature(options_.known_points[i].position_m,
+                                         variance_m2 * Eigen::Matrix3d::Identity());
     feature.known = true;
     feature.first_frame = frame->index;
     measurements.push_back({feature.id, found->pixels[i], 0.0});

@@ -35,20 +35,20 @@ cv::Scalar statusColor(const TrackedFeature& feature) {
 
 /// From first (0), cyan, to last (1), magenta: the brighter the earlier, and neither is the colour
 /// of a status.
-cv::Scalar orderColor(double share) {
-  const double s = std::clamp(share, 0.0, 1.0);
+cv::Scalar orderColor(double fraction) {
+  const double s = std::clamp(fraction, 0.0, 1.0);
   return {255.0, 255.0 * (1.0 - s), 255.0 * s};
 }
 
 /// From violet (0) to yellow (1), in even steps of brightness.
-cv::Scalar strengthColor(double share) {
+cv::Scalar strengthColor(double fraction) {
   static const cv::Mat palette = [] {
     cv::Mat values(1, 256, CV_8UC1), colors;
     for (int value = 0; value < 256; ++value) values.at<uchar>(value) = uchar(value);
     cv::applyColorMap(values, colors, cv::COLORMAP_VIRIDIS);
     return colors;
   }();
-  const auto& bgr = palette.at<cv::Vec3b>(cvRound(40 + 215 * std::clamp(share, 0.0, 1.0)));
+  const auto& bgr = palette.at<cv::Vec3b>(cvRound(40 + 215 * std::clamp(fraction, 0.0, 1.0)));
   return {double(bgr[0]), double(bgr[1]), double(bgr[2])};
 }
 
@@ -260,9 +260,10 @@ std::vector<LegendEntry> legendOf(const DrawOptions& options) {
   if (options.tree) add(Symbol::kLine, kGold, "tree");
   if (options.links) legend.push_back({Symbol::kLine, strengthColor, "bits, few to many"});
   if (options.submaps)
-    legend.push_back(
-        {Symbol::kDot, [](double share) { return submapScalar(cvRound(2 * share)); }, "submaps"});
-  if (options.information) add(Symbol::kNone, kWhite, "5.1: bits a match would tell");
+    legend.push_back({Symbol::kDot,
+                      [](double fraction) { return submapScalar(cvRound(2 * fraction)); },
+                      "submaps"});
+  if (options.information) add(Symbol::kNone, kWhite, "5.1: information of a match, bits");
   return legend;
 }
 

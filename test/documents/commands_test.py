@@ -33,7 +33,7 @@ PATIENCE_S = 120
 def commands():
     """(document, command) of all documents, without comments, in order."""
     found = []
-    for document in [SOURCE / 'README.md'] + sorted((SOURCE / 'doc').glob('*.md')):
+    for document in [SOURCE / 'README.md'] + sorted((SOURCE / 'doc').rglob('*.md')):
         text = document.read_text(encoding='utf-8').replace('\\\n', ' ')
         blocks = re.findall(r'^    (.*)$', text, re.M)
         inline = re.findall(r'`([^`\n]+)`', text)
@@ -292,6 +292,7 @@ RECIPES = [
     # Hours of work; tried in small in test/tools/reproduce_test.cpp.
     r'rosrun %s reproduce .*' % PACKAGE, r'rosrun %s reliability' % PACKAGE,
     r'rosrun %s consistency' % PACKAGE, r'scripts/update_.*',
+    r'scripts/compare_runs .*',  # in small in test/tools/compare_runs_test.py
     # Run in machines_test.py.
     r'export ROS_.*', r'ping .*',
     # For people with a board in the hand, another computer, or a screen.

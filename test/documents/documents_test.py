@@ -12,8 +12,8 @@ from pathlib import Path
 
 PACKAGE = "active_matching_slam"
 SOURCE = Path(__file__).resolve().parents[2]
-PROGRAMS = Path(os.environ["AMS_PROGRAMS"])  # where the built tools are
-DOCUMENTS = [SOURCE / "README.md"] + sorted((SOURCE / "doc").glob("*.md"))
+PROGRAMS = Path(os.environ.get("AMS_PROGRAMS", ""))  # where the built tools are
+DOCUMENTS = [SOURCE / "README.md"] + sorted((SOURCE / "doc").rglob("*.md"))
 
 
 def lines():
@@ -35,6 +35,14 @@ def options(tool):
     return set(re.findall(r"(--[a-z][\w-]*)", run(tool, "--help")))
 
 
+@functools.lru_cache(maxsize=None)
+def names_of_tests():
+    tests = "".join(path.read_text(encoding="utf-8") for pattern in ("*.py", "*.cpp")
+                    for path in sorted((SOURCE / "test").rglob(pattern)))
+    cpp = re.findall(r"^TEST(?:_[FP])?\((\w+), (\w+)\)", tests, re.M)
+    return set(re.findall(r"def (test_\w+)\(", tests)) | {".".join(name) for name in cpp}
+
+
 def anchor(heading):
     """As GitHub makes it."""
     kept = re.sub(r"[^\w\- ]", "", heading.strip().lower())
@@ -53,6 +61,12 @@ class Documents(unittest.TestCase):
                 if fragment:
                     headings = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.M)
                     self.assertIn(fragment, map(anchor, headings), document.name)
+
+    def test_lines_of_text_are_at_most_120_columns_long(self):
+        for document in DOCUMENTS:
+            for number, line in enumerate(document.read_text(encoding="utf-8").splitlines(), 1):
+                self.assertTrue(len(line) <= 120 or line.startswith(("|", "![")),
+                                "{}:{}".format(document.name, number))
 
     def test_every_script_named_exists(self):
         for place, line in lines():
@@ -88,16 +102,11 @@ class Documents(unittest.TestCase):
             self.assertIn('"{}"'.format(name.split("/")[-1]), code, "~" + name)
 
     def test_every_test_named_exists(self):
-        tests = [path.read_text(encoding="utf-8") for pattern in ("*.py", "*.cpp")
-                 for path in sorted((SOURCE / "test").rglob(pattern))]
-        python = set(re.findall(r"def (test_\w+)\(", "".join(tests)))
-        cpp = {".".join(name) for name in re.findall(r"^TEST(?:_[FP])?\((\w+), (\w+)\)",
-                                                     "".join(tests), re.M)}
         troubles = (SOURCE / "doc" / "known_troubles.md").read_text(encoding="utf-8")
         named = re.findall(r"`(test_\w+|[A-Z]\w+\.[A-Z]\w+)`", troubles)
         self.assertGreater(len(named), 40)
         for name in named:
-            self.assertIn(name, python | cpp)
+            self.assertIn(name, names_of_tests())
 
     def test_the_table_of_parameters_is_what_the_program_prints(self):
         readme = (SOURCE / "README.md").read_text(encoding="utf-8")
@@ -110,6 +119,75 @@ class Documents(unittest.TestCase):
         for place, line in lines():
             for name in re.findall(r"`((?:" + "|".join(groups) + r")/\w+)`", line):
                 self.assertIn(name, known, place)
+
+
+class Theory(unittest.TestCase):
+    """Each page of doc/theory that ends with constants: its size, and that what these say is true."""
+
+    PAGES = [path for path in sorted((SOURCE / "doc" / "theory").glob("*.md"))
+             if "## Constants" in path.read_text(encoding="utf-8")]
+
+    @staticmethod
+    def number(text):
+        """Of a literal or a fraction; None for anything else."""
+        parts = text.strip().rstrip("f").replace("'", "").split("/")
+        try:
+            numbers = [float(part) for part in parts]
+        except ValueError:
+            return None
+        return numbers[0] / numbers[1] if len(numbers) == 2 else numbers[0]
+
+    @classmethod
+    def rows(cls):
+        for page in cls.PAGES:
+            table = page.read_text(encoding="utf-8").split("## Constants")[1]
+            for name, value, test in re.findall(
+                    r"^\| `([\w/]+)` \| ([^|]*) \|.* \| ([^|]*) \|$", table, re.M):
+                yield page.name, name, value, test
+
+    @classmethod
+    def values_in_the_code(cls):
+        """Values of each name, which may be given in several places."""
+        values = {}
+        text = "".join(path.read_text(encoding="utf-8") for folder in ("src", "include", "scripts")
+                       for path in sorted((SOURCE / folder).rglob("*"))
+                       if path.suffix in {".h", ".cpp"} or path.parent.name == "scripts")
+        text = re.sub(r"//.*", "", text)
+        for name, value in re.findall(r"\b(\w+)\s*=\s*([-\w./' ]+)[,;)\s]", text):
+            values.setdefault(name, set()).add(cls.number(value))
+        group = ""
+        yaml = (SOURCE / "config" / "tracker.yaml").read_text(encoding="utf-8")
+        for indent, name, value in re.findall(r"^( *)(\w+):(.*)$", yaml, re.M):
+            if not value:
+                group = name + "/"
+            full = (group if indent else "") + name
+            values[full] = {cls.number(value)} & values.get(name, {cls.number(value)})
+        return values
+
+    def test_pages_are_short(self):
+        self.assertGreater(len(self.PAGES), 8)
+        for page in self.PAGES:
+            text = page.read_text(encoding="utf-8").splitlines()
+            self.assertLessEqual(len(text), 250, page.name)
+            for number, line in enumerate(text, 1):
+                self.assertTrue(len(line) <= 100 or line.startswith("|"),
+                                "{}:{}".format(page.name, number))
+
+    def test_constants_have_the_values_of_the_code(self):
+        code, rows = self.values_in_the_code(), list(self.rows())
+        wrong = ["{}: {} is not {}".format(page, name, value) for page, name, value, _ in rows
+                 if self.number(value) not in code.get(name, {None}) - {None}]
+        self.assertFalse(wrong, "\n" + "\n".join(wrong))
+        self.assertGreater(len(rows), 100)
+
+    def test_tests_of_constants_exist(self):
+        files = {path.name for path in (SOURCE / "test").rglob("*")}
+        wrong = []
+        for page, name, _, test in self.rows():
+            self.assertRegex(test, r"^(`[\w.]+`|the same|–)$", "{}: {}".format(page, name))
+            if test.startswith("`") and test.strip("`") not in names_of_tests() | files:
+                wrong.append("{}: no {}".format(page, test))
+        self.assertFalse(wrong, "\n" + "\n".join(wrong))
 
 
 class Programs(unittest.TestCase):

@@ -13,7 +13,7 @@ namespace active_matching_slam {
 namespace {
 
 TEST(PoseError, MovesTheEstimateOntoTheTruth) {
-  const Trajectory poses = wanderingTrajectory(40);
+  const Trajectory poses = randomTrajectory(40);
   const Eigen::Isometry3d estimate = poses[3].T_world_camera, truth = poses[30].T_world_camera;
   const Eigen::Matrix<double, 6, 1> error = poseError(estimate, truth);
   EXPECT_TRUE((estimate.translation() + error.head<3>()).isApprox(truth.translation()));
@@ -60,7 +60,7 @@ TEST(ChiSquareMeanBounds, RefuseWhatHasNoMeaning) {
   EXPECT_THROW(chiSquareMeanBounds(6, 1, NAN), std::invalid_argument);
 }
 
-TEST(LikeliestUnit, MakesTheSumOfNormalisedErrorsLeast) {
+TEST(LikeliestScale, MakesTheSumOfNormalisedErrorsLeast) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   const auto drawn = [&] {
@@ -80,30 +80,30 @@ TEST(LikeliestUnit, MakesTheSumOfNormalisedErrorsLeast) {
     for (int k = 0; k < 36; ++k) root(k) = normal(random);
     covariances.push_back(root * root.transpose());
   }
-  const auto cost = [&](double unit) {
+  const auto cost = [&](double scale) {
     double sum = 0.0;
     for (std::size_t i = 0; i < truth.size(); ++i) {
       Eigen::Isometry3d scaled = truth[i];
-      scaled.translation() *= unit;
+      scaled.translation() *= scale;
       sum += *normalisedErrorSquared(poseError(estimates[i], scaled), covariances[i]);
     }
     return sum;
   };
-  const auto unit = likeliestUnit(estimates, truth, covariances);
-  ASSERT_TRUE(unit);
-  EXPECT_NEAR(*unit, 0.4, 0.05);
-  EXPECT_LT(cost(*unit), cost(*unit + 1e-4));
-  EXPECT_LT(cost(*unit), cost(*unit - 1e-4));
+  const auto scale = likeliestScale(estimates, truth, covariances);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(*scale, 0.4, 0.05);
+  EXPECT_LT(cost(*scale), cost(*scale + 1e-4));
+  EXPECT_LT(cost(*scale), cost(*scale - 1e-4));
 }
 
-TEST(LikeliestUnit, IsUnknownWithoutMotionOrCovariance) {
+TEST(LikeliestScale, IsUnknownWithoutMotionOrCovariance) {
   const std::vector<Eigen::Isometry3d> still(2, Eigen::Isometry3d::Identity());
   using Covariances = std::vector<Eigen::Matrix<double, 6, 6>>;
-  EXPECT_FALSE(likeliestUnit({}, {}, {}));
-  EXPECT_FALSE(likeliestUnit(still, still, Covariances(2, Covariances::value_type::Identity())));
+  EXPECT_FALSE(likeliestScale({}, {}, {}));
+  EXPECT_FALSE(likeliestScale(still, still, Covariances(2, Covariances::value_type::Identity())));
   std::vector<Eigen::Isometry3d> moved = still;
   moved[1].translation().x() = 1.0;
-  EXPECT_FALSE(likeliestUnit(moved, moved, Covariances(2, Covariances::value_type::Zero())));
+  EXPECT_FALSE(likeliestScale(moved, moved, Covariances(2, Covariances::value_type::Zero())));
 }
 
 class MonteCarlo : public testing::Test {
@@ -129,12 +129,12 @@ class MonteCarlo : public testing::Test {
 };
 
 TEST_F(MonteCarlo, AConsistentEstimatorLiesWithinTheBoundsNineteenTimesInTwenty) {
-  EXPECT_NEAR(shareWithin(meanNees(1.0), bounds_), 0.95, 0.03);
+  EXPECT_NEAR(fractionWithin(meanNees(1.0), bounds_), 0.95, 0.03);
 }
 
 TEST_F(MonteCarlo, AnOverconfidentOrTimidEstimatorDoesNot) {
-  EXPECT_LT(shareWithin(meanNees(0.5), bounds_), 0.05);
-  EXPECT_LT(shareWithin(meanNees(2.0), bounds_), 0.05);
+  EXPECT_LT(fractionWithin(meanNees(0.5), bounds_), 0.05);
+  EXPECT_LT(fractionWithin(meanNees(2.0), bounds_), 0.05);
 }
 
 TEST(MeanOverRuns, LeavesOutWhatIsMissing) {
@@ -143,8 +143,8 @@ TEST(MeanOverRuns, LeavesOutWhatIsMissing) {
   EXPECT_EQ(mean[0], 2.0);
   EXPECT_EQ(mean[1], 5.0);
   EXPECT_TRUE(std::isnan(mean[2]));
-  EXPECT_EQ(shareWithin(mean, {1.0, 3.0}), 0.5);
-  EXPECT_TRUE(std::isnan(shareWithin({}, {1.0, 3.0})));
+  EXPECT_EQ(fractionWithin(mean, {1.0, 3.0}), 0.5);
+  EXPECT_TRUE(std::isnan(fractionWithin({}, {1.0, 3.0})));
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ TEST(ActiveMatching, IsRightAtLeastAsOftenAsJcbbInClutter) {
 TEST(ActiveMatching, IsRightMoreOftenThanJcbbWhereStructureRepeats) {
   SimulatedProblemOptions options;
   options.false_positive = 1e-4;
-  options.repeated_share = 0.5;
+  options.repeated_fraction = 0.5;
   EXPECT_GT(scoreOf("active", options, 500).right, scoreOf("jcbb", options, 500).right);
 }
 
@@ -80,7 +80,7 @@ TEST(ActiveMatching, IsRightMoreOftenThanJcbbWhereStructureRepeats) {
 SimulatedProblemOptions boardOfLikes() {
   SimulatedProblemOptions options;
   options.features = 40;
-  options.repeated_share = 1.0;
+  options.repeated_fraction = 1.0;
   options.true_positive = 0.97;
   options.noise_sigma_px = 0.5;
   options.map_sigma_m = 0.001;
@@ -99,17 +99,17 @@ TEST(ActiveMatching, IsMisledLessOftenThanJcbbAndRansacWhereEverythingRepeats) {
   EXPECT_GE(scoreOf("active", boardOfLikes(), frames).clean, 90);
 }
 
-TEST(ActiveMatching, IsMisledLessOftenWhenAGaussianIsHeardBeforeItIsDropped) {
+TEST(ActiveMatching, IsMisledLessOftenWithDeferredPruning) {
   MatchOptions does_not = boundedMixture();
-  does_not.hearing_weight = 0.0;
+  does_not.deferred_pruning_weight = 0.0;
   EXPECT_GT(scoreOf("active", boardOfLikes(), 200).clean,
             scoreOf("active", boardOfLikes(), 200, does_not).clean);
 }
 
-TEST(ActiveMatching, IsMisledLessOftenWhenRunnersUpAreSearchedToTheirEnd) {
+TEST(ActiveMatching, IsMisledLessOftenWithKBestAlternatives) {
   MatchOptions asks = boundedMixture(), does_not = asks;
-  asks.hearing_weight = does_not.hearing_weight = 0.0;
-  does_not.runners_up = 0;
+  asks.deferred_pruning_weight = does_not.deferred_pruning_weight = 0.0;
+  does_not.k_best = 0;
   EXPECT_GT(scoreOf("active", boardOfLikes(), 200, asks).clean,
             scoreOf("active", boardOfLikes(), 200, does_not).clean);
 }
@@ -120,15 +120,15 @@ void expectProbabilities(const std::string& matcher, int frames, const MatchOpti
   double claimed = 0.0, right = 0.0, variance = 0.0;
   for (const ReliabilityBin& bin : bins) {
     claimed += bin.frames * bin.mean_weight;
-    right += bin.frames * bin.share_right;
+    right += bin.frames * bin.fraction_correct;
     variance += std::pow(bin.frames * bin.sigma, 2);
     if (bin.frames < 10) continue;
-    EXPECT_NEAR(bin.mean_weight, bin.share_right, 3.0 * bin.sigma)
+    EXPECT_NEAR(bin.mean_weight, bin.fraction_correct, 3.0 * bin.sigma)
         << matcher << ", " << bin.frames << " frames";
   }
   EXPECT_NEAR(claimed, right, 3.0 * std::sqrt(variance)) << matcher;
   EXPECT_GT(bins.back().frames, frames / 2);
-  EXPECT_LT(bins.back().frames, 0.95 * frames) << "too easy to tell anything";
+  EXPECT_LT(bins.back().frames, 0.95 * frames) << "too easy to discriminate";
 }
 
 TEST(MixtureMatching, WeightOfTheAcceptedHypothesisIsAProbability) {
@@ -153,7 +153,7 @@ TEST(ChowLiuMatching, EqualsActiveMatchingOnTheCovarianceOfTheTree) {
   ProblemSimulator simulator(options, 5);
   MatchOptions match_options;
   match_options.keep_trace = true;
-  match_options.recount = false;  // which knows the whole covariance
+  match_options.joint_rescoring = false;  // which knows the whole covariance
   for (int n = 0; n < 20; ++n) {
     SimulatedProblem problem = simulator.next();
     PointListSearch tree_search = problem.search(), dense_search = problem.search();

@@ -44,7 +44,7 @@ std::vector<std::map<std::string, std::string>> parseCsv(const std::string& text
   return rows;
 }
 
-/// 90 frames along the truth in another world and unit, of which ten were lost.
+/// 90 frames along the truth in another world and at another scale, of which ten were lost.
 class Run : public testing::Test {
  protected:
   Run() { std::filesystem::create_directories(directory_); }
@@ -87,7 +87,7 @@ class Run : public testing::Test {
     return report;
   }
 
-  const Trajectory truth_ = wanderingTrajectory(90);
+  const Trajectory truth_ = randomTrajectory(90);
   const Trajectory estimate_ = transformed(truth_, 0.5, someRotation(), {1.0, 2.0, 3.0});
   const std::string directory_ = temporaryPath("run");
 };
@@ -169,7 +169,7 @@ TEST_F(Run, SimulatedTruthGivesTheNeesInTheWorldOfTheMap) {
 }
 
 TEST_F(Run, AFreeScaleRunWithoutErrorHasNoNees) {
-  // The map's world and unit are a convention, not an error.
+  // The map's world and scale are a gauge, not an error.
   RunReport free = report(false);
   free.setTruth({truth_, true, 0.02});
   EXPECT_LT(*free.summary().nees_mean, 1e-9);

@@ -11,7 +11,7 @@
 namespace active_matching_slam {
 
 /// A smooth, hand-held-like motion of `count` poses.
-inline Trajectory wanderingTrajectory(int count, double rate_hz = 30.0) {
+inline Trajectory randomTrajectory(int count, double rate_hz = 30.0) {
   Trajectory trajectory;
   for (int i = 0; i < count; ++i) {
     const double t = i / rate_hz;

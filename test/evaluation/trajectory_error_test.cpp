@@ -16,7 +16,7 @@ std::vector<PosePair> pairsOf(const Trajectory& estimate, const Trajectory& trut
 }
 
 TEST(Align, RecoversAKnownSimilarity) {
-  const Trajectory estimate = wanderingTrajectory(100);
+  const Trajectory estimate = randomTrajectory(100);
   const Eigen::Vector3d t(3.0, -1.0, 0.5);
   const auto pairs = pairsOf(estimate, transformed(estimate, 2.5, someRotation(), t));
   const auto alignment = align(pairs, AlignmentKind::kSimilarity);
@@ -31,7 +31,7 @@ TEST(Align, RecoversAKnownSimilarity) {
 }
 
 TEST(Align, RigidAlignmentKeepsTheScaleError) {
-  const Trajectory estimate = wanderingTrajectory(100);
+  const Trajectory estimate = randomTrajectory(100);
   const auto pairs = pairsOf(estimate, transformed(estimate, 1.1, someRotation(), {1, 2, 3}));
   const auto alignment = align(pairs, AlignmentKind::kRigid);
   ASSERT_TRUE(alignment);
@@ -46,7 +46,7 @@ TEST(Align, RigidAlignmentKeepsTheScaleError) {
 }
 
 TEST(Align, NoSmallChangeOfTheAlignmentLowersTheError) {
-  const Trajectory truth = wanderingTrajectory(80);
+  const Trajectory truth = randomTrajectory(80);
   Trajectory estimate = transformed(truth, 0.7, someRotation(), {1, 1, 1});
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 0.05);
@@ -77,7 +77,7 @@ TEST(Align, NoSmallChangeOfTheAlignmentLowersTheError) {
 }
 
 TEST(Align, AMirroredTrajectoryIsNotAReflectionAway) {
-  const Trajectory truth = wanderingTrajectory(100);
+  const Trajectory truth = randomTrajectory(100);
   Trajectory mirrored = truth;
   for (StampedPose& pose : mirrored) pose.T_world_camera.translation().x() *= -1.0;
   const auto alignment = align(pairsOf(mirrored, truth), AlignmentKind::kSimilarity);
@@ -86,7 +86,7 @@ TEST(Align, AMirroredTrajectoryIsNotAReflectionAway) {
 }
 
 TEST(Align, MotionAlongALineStillHasItsError) {
-  Trajectory truth = wanderingTrajectory(60);
+  Trajectory truth = randomTrajectory(60);
   for (StampedPose& pose : truth)
     pose.T_world_camera.translation() = pose.stamp_s * Eigen::Vector3d(1, 2, 3);
   const auto pairs = pairsOf(transformed(truth, 0.5, someRotation(), {1, 0, 0}), truth);
@@ -97,7 +97,7 @@ TEST(Align, MotionAlongALineStillHasItsError) {
 }
 
 TEST(Align, WhatIsNotDeterminedIsEmpty) {
-  const Trajectory truth = wanderingTrajectory(10);
+  const Trajectory truth = randomTrajectory(10);
   EXPECT_FALSE(align({}, AlignmentKind::kRigid));
   EXPECT_FALSE(align(pairPoses({truth[0], truth[1]}, truth), AlignmentKind::kRigid));
   Trajectory still = truth;
@@ -119,7 +119,7 @@ TEST(AbsoluteTrajectoryError, IsTheRootMeanSquareDistance) {
 }
 
 TEST(RelativePoseError, IsBlindToTheWorldFrame) {
-  const Trajectory truth = wanderingTrajectory(100);
+  const Trajectory truth = randomTrajectory(100);
   const auto error =
       relativePoseError(pairsOf(transformed(truth, 1.0, someRotation(), {1, 2, 3}), truth));
   ASSERT_TRUE(error);
@@ -129,7 +129,7 @@ TEST(RelativePoseError, IsBlindToTheWorldFrame) {
 }
 
 TEST(RelativePoseError, ConstantDriftShowsPerInterval) {
-  Trajectory truth = wanderingTrajectory(100);
+  Trajectory truth = randomTrajectory(100);
   for (StampedPose& pose : truth) pose.T_world_camera.linear().setIdentity();
   Trajectory estimate = truth;
   for (StampedPose& pose : estimate) pose.T_world_camera.translation().x() += 0.02 * pose.stamp_s;
@@ -138,7 +138,7 @@ TEST(RelativePoseError, ConstantDriftShowsPerInterval) {
 }
 
 TEST(RelativePoseError, ConstantTurnShowsPerInterval) {
-  const Trajectory truth = wanderingTrajectory(100);
+  const Trajectory truth = randomTrajectory(100);
   Trajectory estimate = truth;
   for (StampedPose& pose : estimate)  // in the world, so positions stay the truth's
     pose.T_world_camera.linear() =
@@ -148,20 +148,20 @@ TEST(RelativePoseError, ConstantTurnShowsPerInterval) {
 }
 
 TEST(RelativePoseError, FreeScaleIsTakenOutFirst) {
-  const Trajectory truth = wanderingTrajectory(100);
+  const Trajectory truth = randomTrajectory(100);
   const auto pairs = pairsOf(transformed(truth, 0.25, someRotation(), {1, 2, 3}), truth);
   EXPECT_GT(relativePoseError(pairs)->translation_rmse, 0.1);
   EXPECT_LT(relativePoseError(pairs, 1.0, 4.0)->translation_rmse, 1e-12);
 }
 
 TEST(RelativePoseError, ARunShorterThanTheIntervalHasNone) {
-  const Trajectory truth = wanderingTrajectory(20);
+  const Trajectory truth = randomTrajectory(20);
   EXPECT_FALSE(relativePoseError(pairsOf(truth, truth), 1.0));
   EXPECT_FALSE(relativePoseError({}, 1.0));
 }
 
 TEST(RelativePoseError, GapsInTimeAreNotBridged) {
-  Trajectory truth = wanderingTrajectory(100);
+  Trajectory truth = randomTrajectory(100);
   for (std::size_t i = 15; i < truth.size(); ++i) truth[i].stamp_s += 100.0;
   const auto error = relativePoseError(pairsOf(truth, truth), 1.0);
   ASSERT_TRUE(error);

@@ -26,7 +26,7 @@ constexpr int kBlue = 0, kRed = 2;
 
 TrajectoryPlot examplePlot() {
   TrajectoryPlot plot;
-  plot.estimate = wanderingTrajectory(200);
+  plot.estimate = randomTrajectory(200);
   plot.truth = transformed(plot.estimate, 1.0, Eigen::Matrix3d::Identity(), {0.05, 0.05, 0.05});
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
@@ -58,11 +58,11 @@ TEST(TrajectoryPlot, IsTheSameEveryTime) {
 TEST(TrajectoryPlot, DrawsWhateverItIsGiven) {
   EXPECT_NO_THROW(drawTrajectoryPlot({}));
   TrajectoryPlot plot;
-  plot.estimate = wanderingTrajectory(1);
+  plot.estimate = randomTrajectory(1);
   EXPECT_NO_THROW(drawTrajectoryPlot(plot));
   plot.points = {{1e9, -1e9, 1e9}};
   EXPECT_NO_THROW(drawTrajectoryPlot(plot));
-  plot.estimate = wanderingTrajectory(50);
+  plot.estimate = randomTrajectory(50);
   plot.estimate[20].T_world_camera.translation() << 1e7, 0, 0;
   EXPECT_NO_THROW(drawTrajectoryPlot(plot));
 }

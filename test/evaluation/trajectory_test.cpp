@@ -32,7 +32,7 @@ TEST_F(TumFile, TheScalarPartOfTheQuaternionComesLast) {
 }
 
 TEST_F(TumFile, WhatIsWrittenReadsBack) {
-  const Trajectory written = transformed(wanderingTrajectory(50), 2.0, someRotation(), {5, 6, 7});
+  const Trajectory written = transformed(randomTrajectory(50), 2.0, someRotation(), {5, 6, 7});
   writeTrajectoryTum(path_, written);
   const Trajectory back = readTrajectoryTum(path_);
   ASSERT_EQ(back.size(), written.size());
@@ -59,9 +59,8 @@ TEST_F(TumFile, FaultsNameFileAndLine) {
 }
 
 TEST_F(TumFile, AFullDiskIsReportedWithTheFilesName) {
-  EXPECT_NE(
-      faultOf([] { writeTrajectoryTum("/dev/full", wanderingTrajectory(3)); }).find("/dev/full"),
-      std::string::npos);
+  EXPECT_NE(faultOf([] { writeTrajectoryTum("/dev/full", randomTrajectory(3)); }).find("/dev/full"),
+            std::string::npos);
   EXPECT_NE(faultOf([] { writeTrajectoryTum("/nonexistent/t.txt", {}); }).find("/nonexistent"),
             std::string::npos);
 }

@@ -69,17 +69,17 @@ TEST(Consistency, PoseErrorsMatchTheirCovarianceForSharpMeasurements) {
   EXPECT_GE(run(options).frames_within, 0.9);
 }
 
-TEST(Consistency, PoseErrorsMatchTheirCovarianceWhereCornersWander) {
+TEST(Consistency, PoseErrorsMatchTheirCovarianceWhereLandmarksHaveProcessNoise) {
   SimulationOptions options = baseOptions();
   options.sigma_px = 0.3;
-  options.wander_px = 1.0;
-  options.filter.corner_wander_px = 1.0;
-  const MonteCarloResult allowed_for = run(options);
-  EXPECT_GE(allowed_for.frames_within, 0.9);
-  options.filter.corner_wander_px = 0.0;
-  const MonteCarloResult taken_for_fixed = run(options);
-  EXPECT_GT(taken_for_fixed.frames_above, 0.5);
-  EXPECT_LT(allowed_for.rms_position_m, taken_for_fixed.rms_position_m);
+  options.landmark_noise_px = 1.0;
+  options.filter.landmark_noise_px = 1.0;
+  const MonteCarloResult modelled = run(options);
+  EXPECT_GE(modelled.frames_within, 0.9);
+  options.filter.landmark_noise_px = 0.0;
+  const MonteCarloResult ignored = run(options);
+  EXPECT_GT(ignored.frames_above, 0.5);
+  EXPECT_LT(modelled.rms_position_m, ignored.rms_position_m);
 }
 
 TEST(Consistency, AtALowFrameRateTheFilterIsNotOverconfident) {
@@ -98,8 +98,7 @@ TEST(Consistency, AtALowFrameRateRepeatedLinearisationIsMoreAccurate) {
   EXPECT_LT(run(repeated).rms_position_m, 0.95 * run(once).rms_position_m);
 }
 
-/// What the start errs by is the run's to its end: it takes more runs to tell what NEES is on the
-/// whole. It is to lie in the bounds of kRuns.
+/// The error of a start lasts to the run's end: its NEES is one draw, of which many are needed.
 constexpr int kFreeRuns = 100;
 
 /// With free scale a run is judged in its own unit: truth is scaled by the factor that fits the
@@ -162,7 +161,7 @@ TEST_P(FreeScale, TrackAndCovarianceHoldFromTheFirstImageOn) {
     EXPECT_LT(result.scale, 1.4) << run;
     EXPECT_LT(result.rms_m, 0.01 * result.path_m) << run;
   }
-  const auto [low, high] = meanChiSquareBounds(kRuns, 6);
+  const auto [low, high] = meanChiSquareBounds(kFreeRuns, 6);
   const auto within = std::count_if(nees.begin(), nees.end(), [low = low, high = high](double v) {
     return v >= low && v <= high;
   });

@@ -56,35 +56,30 @@ TEST_F(EkfMap, PredictionEqualsThePlainFormulaWithANumericalJacobian) {
 }
 
 TEST_F(EkfMap, PredictionOverNoTimeOrNonsenseChangesNothing) {
-  Ekf before = exampleFilter(model_, 2);
-  FilterOptions options = exampleOptions();
-  options.corner_wander_px = 1.0;
-  before.setOptions(options);
+  const Ekf before = exampleFilter(model_, 2);
   for (const double dt : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     Ekf filter = before;
     filter.predict(dt);
-    filter.letCornersWander(model_, dt);
+    filter.addLandmarkNoise(model_, dt, 1.0);
     EXPECT_EQ(filter.covariance(), before.covariance());
     EXPECT_EQ(filter.camera().position_world, before.camera().position_world);
   }
 }
 
-/// With rays and a point, by 2 px for the root of a radian.
-Ekf filterWhoseCornersWander(const CameraModel& model) {
+/// With inverse depths and a point.
+Ekf filterWithAPoint(const CameraModel& model) {
   Ekf filter = exampleFilter(model, 3);
   filter.addPointFeature(filter.camera().poseWorldCamera() * Eigen::Vector3d(0.3, -0.2, 1.5),
                          1e-4 * Eigen::Matrix3d::Identity());
-  FilterOptions options = exampleOptions();
-  options.corner_wander_px = 2.0;
-  filter.setOptions(options);
   return filter;
 }
 
-TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
-  Ekf filter = filterWhoseCornersWander(model_);
+TEST_F(EkfMap, LandmarkNoiseIsARandomWalkAcrossTheRayByTheAngleOfTheView) {
+  Ekf filter = filterWithAPoint(model_);
+  const double sigma_px = 2.0;
   const double dt = 1e-4;
   const Eigen::MatrixXd before = filter.covariance();
-  filter.letCornersWander(model_, dt);
+  filter.addLandmarkNoise(model_, dt, sigma_px);
   Eigen::MatrixXd growth = filter.covariance() - before;
   const Eigen::Vector3d here = filter.camera().position_world;
   const Eigen::Vector3d there = here - dt * filter.camera().velocity_world;
@@ -92,7 +87,8 @@ TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
   for (const FeatureState& feature : filter.features()) {
     const Eigen::Vector3d ray = (feature.position() - here).normalized();
     const double turned_rad = ray.cross((feature.position() - there).normalized()).norm();
-    const double variance = 4.0 * turned_rad / std::pow(model_.calibration().fx, 2);  // rad^2
+    const double sigma_rad = sigma_px / model_.calibration().fx;
+    const double variance = sigma_rad * sigma_rad * turned_rad;
     auto own = growth.block(feature.offset, feature.offset, feature.size(), feature.size());
     if (feature.kind == FeatureKind::kPoint) {
       ++points;
@@ -114,25 +110,18 @@ TEST_F(EkfMap, CornersWanderAcrossTheirRaysAsTheViewOfThemTurns) {
   EXPECT_GT(rays, 0);
 }
 
-TEST_F(EkfMap, CornersWanderByAsMuchMoreAsIsSaidOfEach) {
-  const Ekf before = filterWhoseCornersWander(model_);
-  Ekf alike = before, apart = before;
-  std::vector<double> in_that_of_most;
-  for (std::size_t i = 0; i < before.features().size(); ++i) in_that_of_most.push_back(0.5 + i);
-  alike.letCornersWander(model_, 1e-4);
-  apart.letCornersWander(model_, 1e-4, in_that_of_most);
-  for (std::size_t i = 0; i < before.features().size(); ++i) {
-    const FeatureState& feature = before.features()[i];
-    const auto growth = [&](const Ekf& filter) {
-      return (filter.covariance() - before.covariance())
-          .diagonal()
-          .segment(feature.offset, feature.size())
-          .sum();
-    };
-    ASSERT_GT(growth(alike), 0.0);
-    const double square = in_that_of_most[i] * in_that_of_most[i];
-    EXPECT_NEAR(growth(apart), square * growth(alike), 1e-6 * growth(apart)) << i;
+TEST_F(EkfMap, LandmarkNoiseIsNoneWithoutASigmaOrAMotion) {
+  const Ekf before = filterWithAPoint(model_);
+  for (const double sigma_px : {0.0, -1.0, std::nan("")}) {
+    Ekf filter = before;
+    filter.addLandmarkNoise(model_, 0.1, sigma_px);
+    EXPECT_EQ(filter.covariance(), before.covariance());
   }
+  Ekf still = before;
+  still.decayVelocity(0.0);
+  const Eigen::MatrixXd P = still.covariance();
+  still.addLandmarkNoise(model_, 0.1, 2.0);
+  EXPECT_EQ(still.covariance(), P);
 }
 
 TEST_F(EkfMap, ANewFeatureIsPredictedWhereItWasSeenWhateverItsDepth) {
@@ -365,7 +354,7 @@ TEST_F(EkfMap, AnAnchorAtTheOriginIsOneOfWhichNothingIsUncertain) {
     }
     for (Ekf* each : {&filter, &all}) {
       each->predict(0.1);
-      each->letCornersWander(model_, 0.1);
+      each->addLandmarkNoise(model_, 0.1, 0.5);
     }
     const auto measurements = noisyMeasurements(filter, model_, 1.0, random);
     EXPECT_GT(filter.update(model_, measurements).used, 2);

@@ -33,8 +33,7 @@ inline FilterOptions exampleOptions() {
   options.sigma_acceleration_mps2 = 1.0;
   options.sigma_angular_acceleration_rps2 = 1.0;
   options.sigma_px = 1.0;
-  options.corner_wander_px = 0.0;
-  options.calibration_share = 1.0;
+  options.landmark_noise_px = 0.0;
   options.initial_sigma_velocity_mps = 0.5;
   options.initial_sigma_angular_velocity_rps = 0.5;
   options.initial_inverse_depth = 0.5;

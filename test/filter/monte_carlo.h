@@ -7,6 +7,7 @@
 
 #include "active_matching_slam/filter/ekf.h"
 #include "active_matching_slam/initialisation/initialiser.h"
+#include "filter/chi_square.h"
 #include "filter/example_filter.h"
 
 namespace active_matching_slam {
@@ -29,7 +30,8 @@ struct SimulationOptions {
   double speed = 1.0;          ///< of the hand
   /// Depths of new points: from the filter's prior, or all points on a wall at this distance [m].
   double wall_m = 0.0;
-  double wander_px = 0.0;  ///< by which points move across the ray, per root of a radian of view
+  /// Random walk of the points across their rays, per axis and root of a radian of view.
+  double landmark_noise_px = 0.0;
 };
 
 struct SimulatedFrame {
@@ -61,9 +63,9 @@ class Simulation {
     const double dt = 1.0 / options_.rate_hz;
     const Eigen::Vector3d before = truth_.position_world;
     move(dt);
-    wander(before);
+    moveLandmarks(before);
     filter_.predict(dt);
-    filter_.letCornersWander(model_, dt);
+    filter_.addLandmarkNoise(model_, dt, options_.filter.landmark_noise_px);
     std::vector<FeatureMeasurement> measurements;
     for (const FeatureState& feature : filter_.features()) {
       const auto pixel = seen(points_.at(feature.id));
@@ -165,13 +167,13 @@ class Simulation {
         truth_.q_world_camera * rotationFromVector(dt * truth_.angular_velocity_camera);
   }
 
-  void wander(const Eigen::Vector3d& before) {
-    if (options_.wander_px == 0.0) return;
+  void moveLandmarks(const Eigen::Vector3d& before) {
+    if (options_.landmark_noise_px == 0.0) return;
     for (auto& [id, point] : points_) {
       const Eigen::Vector3d from = point - before, to = point - truth_.position_world;
       const double turned_rad = std::acos(std::min(1.0, from.normalized().dot(to.normalized())));
       const double sigma_m =
-          options_.wander_px / model_.calibration().fx * std::sqrt(turned_rad) * to.norm();
+          options_.landmark_noise_px / model_.calibration().fx * std::sqrt(turned_rad) * to.norm();
       point += to.normalized().cross(random_.vector(sigma_m));
     }
   }
@@ -287,16 +289,6 @@ class Simulation {
   std::map<FeatureId, Eigen::Vector3d> points_;
   FeatureId known_ = 0;
 };
-
-/// 95 % bounds of the mean of `runs` chi-square variables of `degrees` (Wilson & Hilferty 1931).
-inline std::pair<double, double> meanChiSquareBounds(int runs, int degrees) {
-  const double k = static_cast<double>(runs) * degrees;
-  const auto quantile = [k](double z) {
-    const double root = 1.0 - 2.0 / (9.0 * k) + z * std::sqrt(2.0 / (9.0 * k));
-    return k * root * root * root;
-  };
-  return {quantile(-1.959964) / runs, quantile(1.959964) / runs};
-}
 
 struct MonteCarloResult {
   double frames_within = 0.0;  ///< share of frames whose mean NEES lies within its 95 % bounds

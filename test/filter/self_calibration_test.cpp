@@ -76,7 +76,6 @@ Ekf learn(const CameraState& truth, unsigned seed) {
   options.sigma_px = sigma_px;
   options.initial_sigma_focal = options.initial_sigma_radial = 0.01;
   options.initial_sigma_centre = 0.007;
-  options.calibration_share = 1.0;  // errors are white
   options.sigma_acceleration_mps2 = 6.0;
   options.sigma_angular_acceleration_rps2 = 10.0;
   Ekf filter(options);

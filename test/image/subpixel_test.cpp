@@ -43,8 +43,8 @@ TEST(Paraboloid, WithoutAPeakGivesNoOffset) {
 struct Errors {
   double paraboloid = 0.0;  ///< root mean square of the distance per axis [px]
   double gradient = 0.0;
-  double told = 0.0;  ///< of the gradient method, by itself
-  int lost = 0;       ///< the gradient method gave up
+  double sigma_px = 0.0;  ///< that the gradient method states
+  int lost = 0;           ///< the gradient method gave up
   int count = 0;
 };
 
@@ -93,7 +93,7 @@ Errors measureErrors(double shortest_wave, double noise, double gain, double blu
   }
   errors.paraboloid = std::sqrt(paraboloid / (2 * errors.count));
   errors.gradient = std::sqrt(gradient / (2 * (errors.count - errors.lost)));
-  errors.told = std::sqrt(variance / (errors.count - errors.lost));
+  errors.sigma_px = std::sqrt(variance / (errors.count - errors.lost));
   return errors;
 }
 
@@ -118,7 +118,7 @@ TEST(Subpixel, GradientsAreMorePreciseThanTheParaboloid) {
 }
 
 TEST(Subpixel, WhatMovesAlikeIsNotMovedToOneSide) {
-  // Interpolation that bends the phase of short waves finds all of them off by the same share.
+  // Interpolation that bends the phase of short waves finds all of them off by the same fraction.
   for (const double shift : {0.15, 0.25, -0.35}) {
     double sum = 0.0;
     int count = 0;
@@ -140,19 +140,19 @@ TEST(Subpixel, WhatMovesAlikeIsNotMovedToOneSide) {
 TEST(Subpixel, TellsItsErrorFromWhatIsLeft) {
   for (const double noise : {2.0, 5.0}) {
     const Errors errors = measureErrors(6.0, noise, 1.0, 0.0);
-    EXPECT_NEAR(errors.told / errors.gradient, 1.0, 0.35) << noise;
+    EXPECT_NEAR(errors.sigma_px / errors.gradient, 1.0, 0.35) << noise;
   }
   const WaveTexture texture(7, 6.0);
   cv::Mat image = texture.render(60, 60);
   addNoise(&image, 2.0, 1);
   const Template patch = *makeTemplate(image(cv::Rect(25, 25, 11, 11)));
   addNoise(&image, 2.0, 2);
-  const auto seen = refineSubpixel(image, patch, {30.0, 30.0});
-  ASSERT_TRUE(seen);
+  const auto visible = refineSubpixel(image, patch, {30.0, 30.0});
+  ASSERT_TRUE(visible);
   image(cv::Rect(25, 25, 3, 11)) = 128;  // something hides a part of it
   const auto hidden = refineSubpixel(image, patch, {30.0, 30.0});
   ASSERT_TRUE(hidden);
-  EXPECT_GT(hidden->sigma_px, 2.0 * seen->sigma_px);
+  EXPECT_GT(hidden->sigma_px, 2.0 * visible->sigma_px);
 }
 
 TEST(Subpixel, TellsAlongWhichAxisItErrsMore) {
@@ -178,7 +178,7 @@ TEST(Subpixel, TellsAlongWhichAxisItErrsMore) {
     ++count;
   }
   squares /= count;
-  std::printf("errors in those told: %.2f along, %.2f across, %.1f times as long as wide\n",
+  std::printf("errors over stated sigma: %.2f along, %.2f across, %.1f times as long as wide\n",
               std::sqrt(squares[0]), std::sqrt(squares[1]), longer / count);
   EXPECT_GT(longer / count, 1.4);
   EXPECT_NEAR(squares[0], 1.0, 0.35);

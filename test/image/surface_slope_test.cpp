@@ -90,8 +90,8 @@ class SlopeOf : public testing::TestWithParam<std::tuple<double, double>> {};
 TEST_P(SlopeOf, APlaneIsFoundFromViewsAroundIt) {
   const auto [x, y] = GetParam();
   InclinedPlane plane({x, y});
-  const Eigen::Isometry3d aside = plane.views(1).front();
-  const double score_before = plane.score(aside);
+  const Eigen::Isometry3d other_view = plane.views(1).front();
+  const double score_before = plane.score(other_view);
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   unsigned seed = 0;
   for (const Eigen::Isometry3d& now : plane.views(24)) {
@@ -102,7 +102,7 @@ TEST_P(SlopeOf, APlaneIsFoundFromViewsAroundIt) {
     EXPECT_GT(gained.determinant(), 0.0);
     information = plane.patch().slope_information_px2;
   }
-  const double score_after = plane.score(aside);
+  const double score_after = plane.score(other_view);
   std::printf("tangent (%.1f, %.1f): off by %.3f; ZNCC %.4f, was %.4f\n", x, y,
               plane.errorOfTangent(), score_after, score_before);
   EXPECT_LT(plane.errorOfTangent(), 0.05);
@@ -140,7 +140,7 @@ TEST(SurfaceSlope, OneImageOfManyMovesItLittleOnceItIsKnown) {
 }
 
 TEST(SurfaceSlope, NeverBecomesSteeperThanASurfaceThatCanBeSeen) {
-  // What is far steeper than the steepest believed pulls all the time.
+  // What is far steeper than the steepest allowed has a gradient at every image.
   InclinedPlane plane({0.0, 0.0});
   const InclinedPlane other({8.0, 0.0});
   for (int round = 0; round < 20; ++round)
@@ -156,10 +156,10 @@ TEST(SurfaceSlope, NeverBecomesSteeperThanASurfaceThatCanBeSeen) {
 
 TEST(SurfaceSlope, IsLeftAloneByWhatSaysNothing) {
   InclinedPlane plane({0.8, -0.4});
-  const Eigen::Isometry3d aside = plane.views(1).front(), near = plane.views(1, 0.01).front();
-  const cv::Mat image = plane.imageFrom(aside);
-  const PatchView view = plane.viewFrom(aside);
-  const Template expected = plane.expectedFrom(aside);
+  const Eigen::Isometry3d other_view = plane.views(1).front(), near = plane.views(1, 0.01).front();
+  const cv::Mat image = plane.imageFrom(other_view);
+  const PatchView view = plane.viewFrom(other_view);
+  const Template expected = plane.expectedFrom(other_view);
   const auto learns = [&](const cv::Mat& from, const Eigen::Vector2d& pixel, const Template& t) {
     const bool learns = learnSlope(from, pixel, t, view, &plane.patch());
     EXPECT_TRUE(plane.patch().slope_per_px.isZero(0.0) || learns);

@@ -140,6 +140,19 @@ TEST(MapStructureScenes, TheTableInFrontComesApartFromTheWallFarBehind) {
   }
 }
 
+// A turn of the camera moves near and far alike: the more of it is expected, the more they share.
+TEST(MapStructureScenes, ExpectedTurningHoldsTableAndWallTogether) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    CovarianceWorld world = tableBeforeWall(seed);
+    const WorldStructure shifting = test::structureOf(world);
+    world.angular_acceleration_sigma *= 8.0;
+    const WorldStructure turning = test::structureOf(world);
+    EXPECT_LT(partition(turning, 2).preserved - naivePreserved(turning, 2),
+              partition(shifting, 2).preserved - naivePreserved(shifting, 2));
+  }
+}
+
 TEST(MapStructureScenes, TheWallsOfACorridorComeApart) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE(seed);

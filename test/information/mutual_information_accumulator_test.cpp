@@ -32,22 +32,22 @@ std::vector<std::int64_t> randomIds(int count, int map_size, unsigned seed) {
 TEST(MutualInformationAccumulator, AveragesOverTheFramesThatSawBoth) {
   MutualInformationAccumulator accumulator;
   std::map<std::pair<std::int64_t, std::int64_t>, std::vector<double>> plain;
-  std::vector<std::int64_t> seen;
+  std::vector<std::int64_t> visible;
   for (unsigned frame = 0; frame < 25; ++frame) {
     const std::vector<std::int64_t> ids = randomIds(1 + frame % 9, 20, frame);
     const MatrixXd S = randomMeasurementCovariance(static_cast<int>(ids.size()), 100 + frame);
     accumulator.addFrame(ids, S);
-    seen.insert(seen.end(), ids.begin(), ids.end());
+    visible.insert(visible.end(), ids.begin(), ids.end());
     for (std::size_t a = 0; a < ids.size(); ++a) {
       for (std::size_t b = 0; b < ids.size(); ++b) {
         if (ids[a] < ids[b]) plain[{ids[a], ids[b]}].push_back(pairInformationBits(S, a, b));
       }
     }
   }
-  std::sort(seen.begin(), seen.end());
-  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  std::sort(visible.begin(), visible.end());
+  visible.erase(std::unique(visible.begin(), visible.end()), visible.end());
   const MutualInformationGraph graph = accumulator.links();
-  EXPECT_EQ(graph.ids, seen);
+  EXPECT_EQ(graph.ids, visible);
   ASSERT_EQ(graph.links.size(), plain.size());
   auto expected = plain.begin();  // sorted by (first, second), as the links must be
   for (const InformationLink& link : graph.links) {

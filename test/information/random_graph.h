@@ -9,7 +9,7 @@
 namespace active_matching_slam {
 namespace test {
 
-/// `density`: share of pairs that have a link; `levels` distinct weights, few for many ties.
+/// `density`: fraction of pairs that have a link; `levels` distinct weights, few for many ties.
 inline MutualInformationGraph randomGraph(int features, unsigned seed, double density = 1.0,
                                           int levels = 1000000) {
   std::mt19937 generator(seed);

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::MatrixXd;
 
-/// Symmetric; `levels` distinct weights (few: many ties), a share `density` of them not 0.
+/// Symmetric; `levels` distinct weights (few: many ties), a fraction `density` of them not 0.
 MatrixXd randomWeights(int nodes, unsigned seed, int levels, double density) {
   std::mt19937 generator(seed);
   MatrixXd weights = MatrixXd::Zero(nodes, nodes);

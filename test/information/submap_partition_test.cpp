@@ -36,14 +36,14 @@ TEST(SubmapPartition, ComesAsNearToTheNumberAsTheGraphAllows) {
   EXPECT_EQ(partitionIntoSubmaps(s.graph, s.hierarchy, 1000).submaps, 30);
 }
 
-TEST(SubmapPartition, PreservesTheShareWithTheMostSubmaps) {
+TEST(SubmapPartition, PreservesTheFractionWithTheMostSubmaps) {
   for (unsigned seed = 0; seed < 6; ++seed) {
     const Structure s(randomGraph(40, seed, seed % 2 ? 1.0 : 0.2));
-    for (double share : {0.0, 0.3, 0.5, 0.7, 0.9, 1.0}) {
-      const SubmapPartition partition = partitionPreserving(s.graph, s.hierarchy, share);
-      EXPECT_GE(partition.preserved, share);
+    for (double fraction : {0.0, 0.3, 0.5, 0.7, 0.9, 1.0}) {
+      const SubmapPartition partition = partitionPreserving(s.graph, s.hierarchy, fraction);
+      EXPECT_GE(partition.preserved, fraction);
       for (int more = partition.submaps + 1; more <= s.hierarchy.levels[1].submaps; ++more) {
-        EXPECT_LT(partitionIntoSubmaps(s.graph, s.hierarchy, more).preserved, share);
+        EXPECT_LT(partitionIntoSubmaps(s.graph, s.hierarchy, more).preserved, fraction);
       }
       EXPECT_LE(partition.submaps, s.hierarchy.levels[1].submaps);
     }

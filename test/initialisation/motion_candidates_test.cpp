@@ -116,7 +116,7 @@ TEST(DepthReversal, ExchangesNearAndFarAndKeepsWhatANarrowViewShows) {
     }
   }
   Bundle reversed = truth;
-  reverseDepths(model, &reversed);
+  makeBasReliefCounterpart(model, &reversed);
   EXPECT_LT(
       cosineBetween(reversed.cameras.back().position_world, truth.cameras.back().position_world),
       -0.999);

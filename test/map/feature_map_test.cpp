@@ -362,19 +362,19 @@ TEST(FeatureMap, LeavesFirstWhatIsFurthestFromTheView) {
   const FeatureId ahead = world.add({0, 0, 2});
   const FeatureId behind = world.add({0, 0, -2});
   const FeatureId beside = world.add({2, 0, 0.1});
-  EXPECT_EQ(world.map.leastInformative(world.filter, 3),
+  EXPECT_EQ(world.map.leastUseful(world.filter, 3),
             (std::vector<FeatureId>{behind, beside, ahead}));
-  EXPECT_EQ(world.map.leastInformative(world.filter, 1), std::vector<FeatureId>{behind});
-  EXPECT_TRUE(world.map.leastInformative(world.filter, 0).empty());
-  EXPECT_TRUE(world.map.leastInformative(world.filter, -3).empty());
-  EXPECT_EQ(world.map.leastInformative(world.filter, 10).size(), 3u);
+  EXPECT_EQ(world.map.leastUseful(world.filter, 1), std::vector<FeatureId>{behind});
+  EXPECT_TRUE(world.map.leastUseful(world.filter, 0).empty());
+  EXPECT_TRUE(world.map.leastUseful(world.filter, -3).empty());
+  EXPECT_EQ(world.map.leastUseful(world.filter, 10).size(), 3u);
 }
 
 TEST(FeatureMap, CountsAFarFirstViewByTheDepth) {
   World world;
   const FeatureId near = world.add({0, 0, 1}, cameraAt({0.8, 0, 0}));
   const FeatureId far = world.add({0, 0, 10}, cameraAt({0.8, 0, 0}));
-  EXPECT_EQ(world.map.leastInformative(world.filter, 2), (std::vector<FeatureId>{near, far}));
+  EXPECT_EQ(world.map.leastUseful(world.filter, 2), (std::vector<FeatureId>{near, far}));
 }
 
 TEST(FeatureMap, LeavesSoonerWhatIsNotMatched) {
@@ -382,14 +382,14 @@ TEST(FeatureMap, LeavesSoonerWhatIsNotMatched) {
   const FeatureId good = world.add({0.1, 0, 2});
   const FeatureId bad = world.add({0, 0, 2});
   for (int frame = 0; frame < 10; ++frame) world.map.record({{good, true}, {bad, false}}, frame);
-  EXPECT_EQ(world.map.leastInformative(world.filter, 1), std::vector<FeatureId>{bad});
+  EXPECT_EQ(world.map.leastUseful(world.filter, 1), std::vector<FeatureId>{bad});
 }
 
 TEST(FeatureMap, NeverGivesUpTheKnown) {
   World world;
   const FeatureId known = world.add({0, 0, -2}, Isometry3d::Identity(), true);
   const FeatureId other = world.add({0, 0, 2});
-  EXPECT_EQ(world.map.leastInformative(world.filter, 5), std::vector<FeatureId>{other});
+  EXPECT_EQ(world.map.leastUseful(world.filter, 5), std::vector<FeatureId>{other});
   for (int frame = 0; frame < 100; ++frame)
     world.map.record({{known, false}, {other, true}}, frame);
   EXPECT_TRUE(world.map.failing(world.options).empty());

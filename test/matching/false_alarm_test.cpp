@@ -54,8 +54,8 @@ TEST(LogFalseAlarms, IsTheProductOfTheChancesForEachChoice) {
     }
     const Eigen::Matrix2d before = S.block<2, 2>(2 * i, 2 * i);
     const Eigen::Matrix2d after = before - cross.transpose() * others.inverse() * cross;
-    const double share = std::sqrt(after.determinant() / before.determinant());
-    product *= 1.0 - std::pow(1.0 - share, matches[i]);
+    const double fraction = std::sqrt(after.determinant() / before.determinant());
+    product *= 1.0 - std::pow(1.0 - fraction, matches[i]);
   }
   const double expected =
       binomial(14, 3) * binomial(n - 3, k - 3) * std::pow(product, (k - 3.0) / k);
@@ -115,10 +115,10 @@ std::vector<int> largestConsensus(const Eigen::MatrixXd& S, const Eigen::MatrixX
           others.block<2, 2>(2 * a, 2 * b) = S.block<2, 2>(2 * set[a], 2 * set[b]);
       }
       const Eigen::LLT<Eigen::MatrixXd> factor(others);
-      const Eigen::Vector2d missed = innovations.col(i) - cross.transpose() * factor.solve(y);
+      const Eigen::Vector2d residual = innovations.col(i) - cross.transpose() * factor.solve(y);
       const Eigen::Matrix2d left =
           S.block<2, 2>(2 * i, 2 * i) - cross.transpose() * factor.solve(cross);
-      if (missed.dot(left.inverse() * missed) < 9.21) set.push_back(i);
+      if (residual.dot(left.inverse() * residual) < 9.21) set.push_back(i);
     }
     if (set.size() > largest.size()) largest = set;
   }
@@ -140,7 +140,7 @@ TEST(LogFalseAlarms, TellAccidentsFromTheCameraThatMoved) {
     const std::vector<int> accepted = largestConsensus(S, innovations, 200, &generator);
     EXPECT_GT(logFalseAlarms(S, std::vector<int>(n, 1), accepted), -1.0) << accepted.size();
 
-    // A third of the features really seen, the others accidents.
+    // A third of the features are true matches, the others accidental.
     Eigen::VectorXd drawn(2 * n);
     for (int i = 0; i < 2 * n; ++i) drawn[i] = normal(generator);
     const Eigen::MatrixXd root = Eigen::LLT<Eigen::MatrixXd>(S).matrixL();

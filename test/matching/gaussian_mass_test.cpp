@@ -160,12 +160,13 @@ TEST(LiesInside, AgreesWithPointsOnTheBorder) {
     double farthest = 0.0;
     for (int i = 0; i < 4000; ++i) {
       const double t = 2 * M_PI * i / 4000;
-      const Eigen::Vector2d p = inner.center + 3.0 * L * Eigen::Vector2d(std::cos(t), std::sin(t));
+      const Eigen::Vector2d p =
+          inner.center + std::sqrt(kEllipseRadius2) * L * Eigen::Vector2d(std::cos(t), std::sin(t));
       farthest = std::max(farthest, mahalanobisSquared(outer, p));
     }
-    if (std::abs(farthest - 9.0) < 1e-3) continue;
-    EXPECT_EQ(farthest <= 9.0, liesInside(inner, outer));
-    ++(farthest <= 9.0 ? inside : outside);
+    if (std::abs(farthest - kEllipseRadius2) < 1e-3) continue;
+    EXPECT_EQ(farthest <= kEllipseRadius2, liesInside(inner, outer));
+    ++(farthest <= kEllipseRadius2 ? inside : outside);
   }
   EXPECT_GT(inside, 200);
   EXPECT_GT(outside, 200);

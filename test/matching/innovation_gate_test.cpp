@@ -55,8 +55,8 @@ double chi2OfOne(const Innovations& x, const std::vector<int>& all, int i) {
     mean = gain * v;
     covariance -= gain * C.transpose();
   }
-  const Eigen::Vector2d miss = x.values.segment<2>(2 * i) - mean;
-  return miss.dot(covariance.inverse() * miss);
+  const Eigen::Vector2d residual = x.values.segment<2>(2 * i) - mean;
+  return residual.dot(covariance.inverse() * residual);
 }
 
 /// The same rule, the plain way.
@@ -77,11 +77,10 @@ TEST(InnovationCheck, AgreesWithConditioningEachPointOnAllOthers) {
   for (int seed = 0; seed < 30; ++seed) {
     Innovations x = makeInnovations(3 + seed, seed);
     for (int i = 0; i < 2 * (seed % 5); i += 2) x.values(i) += 4.0 + seed;
-    EXPECT_EQ(agreeingMeasurements(x.values, x.S, kThreshold), agreeingOneByOne(x, kThreshold))
+    EXPECT_EQ(leaveOneOutInliers(x.values, x.S, kThreshold), agreeingOneByOne(x, kThreshold))
         << "seed " << seed;
     // A low threshold drops many, one after the other.
-    EXPECT_EQ(agreeingMeasurements(x.values, x.S, 2.0), agreeingOneByOne(x, 2.0))
-        << "seed " << seed;
+    EXPECT_EQ(leaveOneOutInliers(x.values, x.S, 2.0), agreeingOneByOne(x, 2.0)) << "seed " << seed;
   }
 }
 
@@ -89,7 +88,7 @@ TEST(InnovationCheck, KeepsNearlyAllThatAgree) {
   int kept = 0;
   for (int seed = 0; seed < 50; ++seed) {
     const Innovations x = makeInnovations(40, seed);
-    kept += static_cast<int>(agreeingMeasurements(x.values, x.S, kThreshold).size());
+    kept += static_cast<int>(leaveOneOutInliers(x.values, x.S, kThreshold).size());
   }
   // 99.9 % of them by the threshold, 2000 drawn: 2 +- 1.4 are dropped.
   EXPECT_GE(kept, 2000 - 8);
@@ -107,7 +106,7 @@ TEST(InnovationCheck, FindsOnePercentToThirtyPercentOfOutliers) {
       const double a = angle(generator), s = size(generator);
       x.values.segment<2>(2 * order[k]) += s * Eigen::Vector2d(std::cos(a), std::sin(a));
     }
-    const std::vector<int> kept = agreeingMeasurements(x.values, x.S, kThreshold);
+    const std::vector<int> kept = leaveOneOutInliers(x.values, x.S, kThreshold);
     for (int k = 0; k < outliers; ++k)
       EXPECT_FALSE(std::binary_search(kept.begin(), kept.end(), order[k]))
           << "of " << outliers << " outliers, that at " << order[k];
@@ -118,29 +117,29 @@ TEST(InnovationCheck, FindsOnePercentToThirtyPercentOfOutliers) {
 TEST(InnovationCheck, AnswersInAscendingOrder) {
   Innovations x = makeInnovations(30, 3);
   x.values(10) += 50.0;
-  const std::vector<int> kept = agreeingMeasurements(x.values, x.S, kThreshold);
+  const std::vector<int> kept = leaveOneOutInliers(x.values, x.S, kThreshold);
   EXPECT_TRUE(std::is_sorted(kept.begin(), kept.end()));
   EXPECT_EQ(kept.size(), 29u);
 }
 
 TEST(InnovationCheck, OfNothingKeepsNothing) {
-  EXPECT_TRUE(agreeingMeasurements(Eigen::VectorXd(), Eigen::MatrixXd(), kThreshold).empty());
+  EXPECT_TRUE(leaveOneOutInliers(Eigen::VectorXd(), Eigen::MatrixXd(), kThreshold).empty());
 }
 
 TEST(InnovationCheck, AsksOfASinglePointOnlyItsOwnCovariance) {
   const Eigen::Matrix2d S = Eigen::Matrix2d::Identity();
-  EXPECT_EQ(agreeingMeasurements(Eigen::Vector2d(3.0, 2.0), S, kThreshold), std::vector<int>{0});
-  EXPECT_TRUE(agreeingMeasurements(Eigen::Vector2d(3.0, 3.0), S, kThreshold).empty());
+  EXPECT_EQ(leaveOneOutInliers(Eigen::Vector2d(3.0, 2.0), S, kThreshold), std::vector<int>{0});
+  EXPECT_TRUE(leaveOneOutInliers(Eigen::Vector2d(3.0, 3.0), S, kThreshold).empty());
 }
 
 TEST(InnovationCheck, KeepsNothingWhereTheCovarianceIsNotPositive) {
   const Eigen::VectorXd innovation = Eigen::VectorXd::Zero(4);
   Eigen::MatrixXd S = Eigen::MatrixXd::Ones(4, 4);  // singular
-  EXPECT_TRUE(agreeingMeasurements(innovation, S, kThreshold).empty());
+  EXPECT_TRUE(leaveOneOutInliers(innovation, S, kThreshold).empty());
   S = -Eigen::MatrixXd::Identity(4, 4);
-  EXPECT_TRUE(agreeingMeasurements(innovation, S, kThreshold).empty());
+  EXPECT_TRUE(leaveOneOutInliers(innovation, S, kThreshold).empty());
   S = Eigen::MatrixXd::Constant(4, 4, std::nan(""));
-  EXPECT_TRUE(agreeingMeasurements(innovation, S, kThreshold).empty());
+  EXPECT_TRUE(leaveOneOutInliers(innovation, S, kThreshold).empty());
 }
 
 }  // namespace

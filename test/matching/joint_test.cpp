@@ -37,9 +37,9 @@ void expectPlainConditionals(const Joint& joint, const Eigen::MatrixXd& S) {
   std::vector<int> measured;
   auto given = joint.prior();
   for (int c = 0; c + 1 < size; c += 2) {
-    joint.measure(given, (c + 1) % size);  // a branch that shares what came before
+    joint.measure(given, (c + 1) % size);  // a branch with a common past
     const auto next = joint.measure(given, c);
-    EXPECT_EQ(next, joint.measure(given, c)) << "siblings share one covariance";
+    EXPECT_EQ(next, joint.measure(given, c)) << "siblings have one covariance";
     const Eigen::MatrixXd S_mm = block(S, measured, measured);
     const auto conditional = [&](const std::vector<int>& a, const std::vector<int>& b) {
       Eigen::MatrixXd result = block(S, a, b);

@@ -166,7 +166,6 @@ void expectDefaults(const std::vector<BoundOption>& options, const std::string& 
 
 TEST(ShippedSettings, HoldEveryKeyWithItsDefault) {
   Settings settings;
-  settings.tracker = liveTrackerOptions();
   expectDefaults(bindOptions(&settings.tracker, nullptr), "../config/tracker.yaml",
                  "write it anew: parameter_table --tracker-yaml");
   expectDefaults(bindOptions(nullptr, &settings.node), "../config/ros.yaml",

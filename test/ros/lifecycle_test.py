@@ -50,12 +50,12 @@ class LifecycleTest(harness.TrackerTestCase):
         # One path before and after, in one scale; nothing in between.
         self.assertIsNotNone(poses.wait_for_stamp(last))
         self.assertIsNone(poses.wait_for_stamp(away, 0.0))
-        told = [message for message in poses.messages
+        received = [message for message in poses.messages
                 if message.header.stamp.to_sec() > self.shift.to_sec()]
         truths = self.recording.truth_from_first(
-            [message.header.stamp - self.shift for message in told])
+            [message.header.stamp - self.shift for message in received])
         errors, _ = harness.position_errors_after_scaling(
-            [harness.matrix_of_pose(message.pose.pose) for message in told], truths)
+            [harness.matrix_of_pose(message.pose.pose) for message in received], truths)
         excursion = max(np.linalg.norm(truth[:3, 3]) for truth in truths)
         self.assertLess(np.median(errors), 0.2 * excursion)
 

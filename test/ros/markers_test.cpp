@@ -200,7 +200,7 @@ TEST(MarkerHistory, DeletesWhatIsNoMore) {
   EXPECT_EQ(Marker::DELETE, find(markers, "ellipsoids", 2)->action);
   for (const Marker& marker : markers.markers)
     EXPECT_EQ(worldHeader().stamp, marker.header.stamp) << "what is deleted has a stamp too";
-  for (int again = 1; again < MarkerHistory::kRepetitions; ++again) {
+  for (int again = 1; again < MarkerHistory::kDeletionRepeats; ++again) {
     markers = featureMarkers(frame, worldHeader());
     history.complete(worldHeader(), &markers);
     ASSERT_TRUE(find(markers, "ellipsoids", 2)) << "a viewer may have missed it " << again;

@@ -50,7 +50,7 @@ struct SampledCovariance {
 };
 
 /// Draws true cameras around the mean, moves each to the body by the definitions of pose and twist
-/// alone, and looks at how the results scatter.
+/// alone, and takes the covariance of the results.
 SampledCovariance sampleCovariance(const CameraState& mean, const MotionCovariance& covariance,
                                    const Eigen::Isometry3d& T_camera_body, int count) {
   std::mt19937 generator(5);

@@ -102,7 +102,7 @@ class RobotTest(unittest.TestCase):
         T_world_camera = harness.matrix_of_pose(pose.pose.pose)
 
         # The chain map, odom, base, camera ends where the tracker sees the camera.
-        # What this image told of map and odom is dated ahead, the robot's own part is not.
+        # The transform of this image between map and odom is dated ahead, the robot's own part is not.
         T_map_odom = self.lookup('map', 'odom', last + rospy.Duration(0.1))
         T_map_camera = T_map_odom.dot(self.lookup('odom', self.camera_frame, last))
         T_map_world = self.lookup('map', 'world', last)

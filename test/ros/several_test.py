@@ -51,10 +51,10 @@ class SeveralTest(harness.TrackerTestCase):
         stamp = self.image(39).header.stamp
         one, twin = (poses[name].wait_for_stamp(stamp).pose for name in ('/one', '/twin'))
         self.assertEqual(one, twin, 'bit for bit')
-        told = [statistics[name].wait_for_stamp(stamp) for name in self.trackers]
-        self.assertEqual(['active', 'active', 'jcbb'], [message.matcher for message in told])
-        self.assertEqual(told[0].pixels_searched, told[1].pixels_searched)
-        self.assertNotEqual(told[0].pixels_searched, told[2].pixels_searched)
+        received = [statistics[name].wait_for_stamp(stamp) for name in self.trackers]
+        self.assertEqual(['active', 'active', 'jcbb'], [message.matcher for message in received])
+        self.assertEqual(received[0].pixels_searched, received[1].pixels_searched)
+        self.assertNotEqual(received[0].pixels_searched, received[2].pixels_searched)
 
     def test_reset_settings_and_odd_input_of_one_are_its_own(self):
         statistics = self.inboxes('statistics', MatchingStatistics)

@@ -123,9 +123,9 @@ class TrackerTest(harness.TrackerTestCase):
                               harness.matrix_of_pose(before.pose.pose))[:3, 3] / dt
             R_world_camera = harness.matrix_of_pose(now.pose.pose)[:3, :3]
             v = now.twist.twist.linear
-            told = np.array([v.x, v.y, v.z])
-            errors.append(np.linalg.norm(R_world_camera.T.dot(velocity_world) - told))
-            errors_if_in_world.append(np.linalg.norm(velocity_world - told))
+            published = np.array([v.x, v.y, v.z])
+            errors.append(np.linalg.norm(R_world_camera.T.dot(velocity_world) - published))
+            errors_if_in_world.append(np.linalg.norm(velocity_world - published))
             speeds.append(np.linalg.norm(velocity_world))
         self.assertLess(np.median(errors), 0.5 * np.median(speeds))
         self.assertLess(np.median(errors), np.median(errors_if_in_world))
@@ -162,16 +162,16 @@ class TrackerTest(harness.TrackerTestCase):
         self.assertEqual(['x', 'y', 'z', 'sigma', 'id', 'submap', 'rgb'],
                          [field.name for field in cloud.fields])
         self.assertEqual('bgr8', inboxes['debug_image'].wait_for_stamp(last.header.stamp).encoding)
-        told = {}
+        published = {}
         for name in ('images', 'tracking'):
             report = diagnostics.wait_for(lambda message: any(
                 status.name.endswith(': ' + name) for status in message.status))
-            told.update((value.key, value.value) for status in report.status
+            published.update((value.key, value.value) for status in report.status
                         if status.name.endswith(': ' + name) for value in status.values)
         self.assertLessEqual({
             'received [Hz]', 'tracked [Hz]', 'dropped', 'latency from stamp, mean [ms]', 'state',
             'scale', 'matcher', 'features', 'candidates', 'matched', 'resets', 'times lost',
-            'NIS by its degrees of freedom (1 when consistent)'}, set(told))
+            'NIS by its degrees of freedom (1 when consistent)'}, set(published))
 
     def test_what_nobody_listens_to_is_not_computed(self):
         statistics = self.inbox('statistics', MatchingStatistics)

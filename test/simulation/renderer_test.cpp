@@ -103,7 +103,7 @@ double castPlainly(const Scene& scene, const Vector3d& from, const Vector3d& dir
   return level;
 }
 
-Scene scatteredRectangles(int count, double spread, double size, double near, double far) {
+Scene randomRectangles(int count, double spread, double size, double near, double far) {
   Random random(4);
   Scene scene;
   for (int i = 0; i < count; ++i) {
@@ -145,11 +145,11 @@ void expectSameAsPlainFormula(const Scene& scene) {
 }
 
 TEST(Renderer, SeesWhatThePlainFormulaSees) {
-  expectSameAsPlainFormula(scatteredRectangles(80, 1.7, 1.5, 1.0, 6.0));
+  expectSameAsPlainFormula(randomRectangles(80, 1.7, 1.5, 1.0, 6.0));
 }
 
 TEST(Renderer, SeesCrowdsOfSmallThings) {
-  expectSameAsPlainFormula(scatteredRectangles(400, 0.6, 0.12, 5.0, 6.0));
+  expectSameAsPlainFormula(randomRectangles(400, 0.6, 0.12, 5.0, 6.0));
 }
 
 TEST(Renderer, ShowsNothingFromBehind) {

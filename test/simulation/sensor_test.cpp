@@ -53,7 +53,7 @@ TEST(Sensor, GainScalesAndWhiteClips) {
   EXPECT_EQ(image.at<uchar>(5, 5), 255);
 }
 
-TEST(Sensor, CornersLoseTheStatedShareOfLight) {
+TEST(Sensor, CornersLoseTheStatedFractionOfLight) {
   const Sensor sensor(320, 240, 0.0, 0.4);
   cv::Mat image;
   sensor.expose(light(200.0 / 255.0), 1.0, 1, image);

@@ -40,7 +40,7 @@ inline const Film& slowFilm() {
 
 /// Largest error of a short film at 320 x 240, over the path. A slow start from rest leaves
 /// translation and rotation hard to tell apart, which dominates it.
-inline constexpr double kShareOfPath = 0.02;
+inline constexpr double kFractionOfPath = 0.02;
 
 inline Tracker slowTracker(const TrackerOptions& options = {}) {
   return Tracker(slowFilm().camera, options);

@@ -46,7 +46,7 @@ TEST(TrackerScale, TracksOnInTheNewScale) {
   EXPECT_GT(matched_scaled, 0.9 * matched_unscaled) << "first views are scaled too";
   const PathFit one = fitPath(film, scaled, 90), other = fitPath(film, unscaled, 90);
   EXPECT_NEAR(one.scale * factor / other.scale, 1.0, 0.02);
-  EXPECT_LT(one.rms_m, kShareOfPath * one.path_m);
+  EXPECT_LT(one.rms_m, kFractionOfPath * one.path_m);
 }
 
 TEST(TrackerScale, RefusesAScaleThatIsNone) {

@@ -53,7 +53,7 @@ TEST(Tracker, FollowsASlowCameraToTheEnd) {
   }
   const PathFit fit = fitPath(film, frames);
   RecordProperty("rms_mm", std::to_string(1e3 * fit.rms_m));
-  EXPECT_LT(fit.rms_m, kShareOfPath * fit.path_m) << fit.path_m << " m long";
+  EXPECT_LT(fit.rms_m, kFractionOfPath * fit.path_m) << fit.path_m << " m long";
 }
 
 TEST(Tracker, TakesAllThatTheFirstImageHas) {
@@ -227,7 +227,7 @@ TEST(Tracker, SurvivesTheDark) {
   EXPECT_EQ(after.back()->state, TrackingState::kTracking);
   EXPECT_EQ(after.back()->resets, 0);
   const PathFit fit = fitPath(film, Frames(after.begin() + 10, after.end()), 80);
-  EXPECT_LT(fit.rms_m, kShareOfPath * fit.path_m);
+  EXPECT_LT(fit.rms_m, kFractionOfPath * fit.path_m);
 }
 
 TEST(Tracker, IsLostInTheDarkAndClaimsSoAfterTheFramesAllowed) {
@@ -263,7 +263,7 @@ TEST(Tracker, FindsItselfAfterBeingLost) {
   EXPECT_EQ(after.back()->state, TrackingState::kTracking);
   EXPECT_EQ(after.back()->resets, 0);
   const PathFit fit = fitPath(film, Frames(after.begin() + 20, after.end()), 100);
-  EXPECT_LT(fit.rms_m, kShareOfPath * fit.path_m);
+  EXPECT_LT(fit.rms_m, kFractionOfPath * fit.path_m);
 }
 
 TEST(Tracker, IsNotFooledByNoise) {
@@ -277,7 +277,7 @@ TEST(Tracker, IsNotFooledByNoise) {
   const Frames after = trackFrames(film, &tracker, 66, 180);
   EXPECT_EQ(after.back()->state, TrackingState::kTracking);
   const PathFit fit = fitPath(film, Frames(after.begin() + 10, after.end()), 76);
-  EXPECT_LT(fit.rms_m, kShareOfPath * fit.path_m);
+  EXPECT_LT(fit.rms_m, kFractionOfPath * fit.path_m);
 }
 
 TEST(Tracker, StaysFiniteWhenItStartsOnNoise) {
@@ -335,7 +335,7 @@ TEST(Tracker, ChangesItsMatcherWithoutLosingTheMap) {
   }
   EXPECT_EQ(frames.back()->resets, 0);
   const PathFit fit = fitPath(film, frames);
-  EXPECT_LT(fit.rms_m, kShareOfPath * fit.path_m);
+  EXPECT_LT(fit.rms_m, kFractionOfPath * fit.path_m);
 }
 
 TEST(Tracker, MeasuresAsManyFeaturesAsItIsTold) {
@@ -427,7 +427,7 @@ TEST(Tracker, SurvivesAnOccluderForHalfASecond) {
     EXPECT_TRUE(isFinite(*frames[i])) << "frame " << i;
   }
   const PathFit fit = fitPath(film, frames);
-  EXPECT_LT(fit.rms_m, 2.0 * kShareOfPath * fit.path_m);
+  EXPECT_LT(fit.rms_m, 2.0 * kFractionOfPath * fit.path_m);
 }
 
 TEST(Tracker, AccountsForEveryCandidate) {

@@ -8,7 +8,7 @@
 
 namespace active_matching_slam {
 
-/// What a calibration got wrong, as far as images tell: a pixel at n from the image centre, over
+/// Correction of a calibration (self-calibration states): a pixel at n from the image centre, over
 /// the focal length, moves to centre + (1 + focal + radial |n|^2) n.
 struct LensCorrection {
   double focal = 0.0;   ///< relative growth of the focal length
@@ -38,7 +38,7 @@ class CameraModel {
       const Eigen::Vector3d& point_camera,
       Eigen::Matrix<double, 2, 3>* d_pixel_d_point = nullptr) const;
 
-  /// How a pixel that project() returned answers to the correction: columns focal, radial, centre
+  /// Jacobian of a pixel that project() returned by the correction: columns focal, radial, centre
   /// (2).
   Eigen::Matrix<double, 2, 4> pixelByCorrection(const Eigen::Vector2d& pixel) const;
 

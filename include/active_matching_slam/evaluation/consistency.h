@@ -18,13 +18,13 @@ Eigen::Matrix<double, 6, 1> poseError(const Eigen::Isometry3d& T_world_camera_es
 std::optional<double> normalisedErrorSquared(const Eigen::VectorXd& error,
                                              const Eigen::MatrixXd& covariance);
 
-/// Where the unit of length is a convention (a map of free scale): the factor for the translations
-/// of `truth`, by which the sum of the normalised errors squared of `estimates` is least. Arguments
+/// Fixes the scale gauge of a map of free scale: the factor for the translations of `truth` that
+/// minimises the sum of the normalised errors squared of `estimates`. Arguments
 /// have equal sizes; all poses are from one world, the map's. Empty without a proper covariance or
 /// when the truth never leaves the origin.
-std::optional<double> likeliestUnit(const std::vector<Eigen::Isometry3d>& estimates,
-                                    const std::vector<Eigen::Isometry3d>& truth,
-                                    const std::vector<Eigen::Matrix<double, 6, 6>>& covariances);
+std::optional<double> likeliestScale(const std::vector<Eigen::Isometry3d>& estimates,
+                                     const std::vector<Eigen::Isometry3d>& truth,
+                                     const std::vector<Eigen::Matrix<double, 6, 6>>& covariances);
 
 /// Two-sided bounds.
 struct ChiSquareBounds {
@@ -42,7 +42,7 @@ ChiSquareBounds chiSquareMeanBounds(int degrees, int runs, double confidence = 0
 /// length; a step that no run reached with a value is NaN.
 std::vector<double> meanOverRuns(const std::vector<std::vector<double>>& values_of_run);
 
-/// Share of the finite values within the bounds; NaN when there is none.
-double shareWithin(const std::vector<double>& values, const ChiSquareBounds& bounds);
+/// Fraction of the finite values within the bounds; NaN when there is none.
+double fractionWithin(const std::vector<double>& values, const ChiSquareBounds& bounds);
 
 }  // namespace active_matching_slam

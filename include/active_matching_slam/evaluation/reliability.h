@@ -20,12 +20,12 @@ bool claimIsTrue(const SimulatedProblem& problem, const PointListSearch& search,
 struct ReliabilityBin {
   int frames = 0;
   double mean_weight = 0.0;
-  double share_right = 0.0;
-  /// Standard deviation of share_right if the weights are probabilities.
+  double fraction_correct = 0.0;
+  /// Standard deviation of fraction_correct if the weights are probabilities.
   double sigma = 0.0;
 };
 
-/// The reliability diagram of a matcher: weights against the shares of frames that were right.
+/// The reliability diagram of a matcher: weights against the fractions of frames that were correct.
 class Reliability {
  public:
   explicit Reliability(int bins) : counts_(static_cast<std::size_t>(bins)) {}

@@ -44,9 +44,9 @@ struct RunSummary {
 
   int truth_pairs = 0;  ///< tracked frames with a true pose
   std::optional<double> ate_sim3_m, ate_se3_m, sim3_scale;
-  std::optional<RelativePoseError> rpe;     ///< over 1 s; scaled as Sim(3) where the scale is free
-  std::optional<double> nees_mean;          ///< of the 6-D pose over the frames
-  std::optional<double> nees_share_within;  ///< share of single frames within their 95 % bounds
+  std::optional<RelativePoseError> rpe;  ///< over 1 s; scaled as Sim(3) where the scale is free
+  std::optional<double> nees_mean;       ///< of the 6-D pose over the frames
+  std::optional<double> nees_fraction_within;  ///< of frames within their own 95 % bounds
   Excursion excursion;
 
   double matched_mean = 0.0, candidates_mean = 0.0;  ///< over the tracked frames
@@ -64,8 +64,8 @@ FrameErrors frameErrors(const std::vector<FrameRecord>& records, const RunTruth&
 
 Trajectory trackedTrajectory(const std::vector<FrameRecord>& records);
 
-/// Nearest-rank percentile, `share` in (0, 1]; 0 without values.
-double percentile(std::vector<double> values, double share);
+/// Nearest-rank percentile, `fraction` in (0, 1]; 0 without values.
+double percentile(std::vector<double> values, double fraction);
 
 /// Durations of a frame by name [ms]: the stages of FrameTimings but its total, then the parts of
 /// matching, then "total".

@@ -24,8 +24,8 @@ struct SimulatedProblemOptions {
   double noise_sigma_px = 1.0;
   double true_positive = 0.9;    ///< probability that a feature answers where it is
   double false_positive = 2e-5;  ///< clutter per pixel
-  /// Share of the features that lie on a repeated texture and answer at its neighbours too.
-  double repeated_share = 0.0;
+  /// Fraction of the features that lie on a repeated texture and answer at its neighbours too.
+  double repeated_fraction = 0.0;
   double repeat_px = 12.0;  ///< pitch of the repeated texture
 };
 

@@ -16,7 +16,7 @@ std::string mutualInformationCsv(const MutualInformationGraph& graph);
 /// One row a level and feature: level, feature (id), submap (label).
 std::string submapsCsv(const SubmapHierarchy& hierarchy);
 
-/// One row a level: level, submaps, preserved_chow_liu, preserved_naive (shares, 0 to 1).
+/// One row a level: level, submaps, preserved_chow_liu, preserved_naive (fractions, 0 to 1).
 std::string submapQualityCsv(const SubmapHierarchy& hierarchy);
 
 /// The matrices of pairwise information at one level, ordered by cluster (Chli 2009, Fig. 6.13),

@@ -17,12 +17,12 @@ struct Finding {
   enum class Verdict {
     kAgrees,
     kDiffers,
-    kUnjudged  ///< a figure to look at: hardware, images or features are not the thesis's
+    kNoVerdict  ///< a figure to look at: hardware, images or features are not the thesis's
   };
   std::string quantity;
   std::string thesis;
   std::string here;
-  Verdict verdict = Verdict::kUnjudged;
+  Verdict verdict = Verdict::kNoVerdict;
   bool is_duration = false;  ///< `here` or the verdict rests on measured time
 };
 
@@ -35,7 +35,7 @@ struct ExperimentResult {
 struct LaboratorySettings {
   std::string data;    ///< folder of the recorded sequences; empty: simulated ones alone
   bool quick = false;  ///< short sequences, small images, few frames
-  std::function<void(const std::string&)> progress;  ///< told what is going on; may be empty
+  std::function<void(const std::string&)> progress;  ///< called with each step; may be empty
 };
 
 /// Names of the experiments, each after the first table or figure of the thesis that it repeats, in

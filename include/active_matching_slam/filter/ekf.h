@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -26,14 +27,19 @@ struct FeatureMeasurement {
   FeatureId id = -1;
   Eigen::Vector2d pixel;
   double sigma_px = 0.0;  ///< per axis; 0: FilterOptions::sigma_px
-  /// Images that share its error, at least 1: all that was before the image, which remembers, is
-  /// told of it as of white noise of so many times the variance.
-  double repetitions = 1.0;
+  /// By how much its error's long-run variance exceeds its variance, at least 1: what was known
+  /// before the image learns from it as from white noise inflated by so much.
+  double variance_inflation = 1.0;
   /// Covariance of its error over sigma_px^2 (trace 2).
   Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
-  /// Variance of the part of its error that lasts, in that of most matches: where many images of
-  /// its feature are taken together, as the start's adjustment does, this is what is left of it.
-  double lasting = 1.0;
+};
+
+/// Prior of the variance factor that R of all measurements of an image have in common: inverse
+/// gamma, of mean 1.
+struct NoisePrior {
+  /// Degrees of freedom; infinite: R is known.
+  double degrees = std::numeric_limits<double>::infinity();
+  double minimum_px2 = 0.0;  ///< bound of a typical measurement's variance per axis
 };
 
 struct UpdateReport {
@@ -41,12 +47,15 @@ struct UpdateReport {
   int skipped = 0;      ///< unknown id, not finite, or behind the camera
   double nis = 0.0;     ///< normalised innovation squared of all used, 2 * used degrees of freedom
   bool healthy = true;  ///< false: the covariance had to be repaired or the update was refused
-  /// Of each measurement given, the share of its variance that it should still show, less the
-  /// feature's projection, after the update (per axis): the state follows the rest. 0: not used.
-  std::vector<double> noise_left;
-  /// What the state leaves of each measurement, first order, along axes in which its noise is of
-  /// equal size and independent [px]; zero: not used.
-  std::vector<Eigen::Vector2d> left_px;
+  /// Redundancy number of each measurement given (Baarda 1968): the fraction of its variance that
+  /// its post-fit residual has, 0 to 1; the state follows the rest. 0: not used.
+  std::vector<double> redundancy;
+  /// Post-fit residual of each, first order, along axes in which its noise is of equal size and
+  /// independent [px]; zero: not used.
+  std::vector<Eigen::Vector2d> residual_px;
+  /// Estimate of the variance factor common to the measurements, 1 where R is right (see
+  /// NoisePrior), and its degrees of freedom.
+  double noise_scale = 1.0, noise_degrees = 0.0;
 };
 
 /// Extended Kalman filter over camera and map with full covariance in error-state form. The map's
@@ -77,16 +86,14 @@ class Ekf {
   /// Moves on by `interval_s` >= 0 with constant velocity (eq. 3.6-3.8).
   void predict(double interval_s);
 
-  /// Where a corner lies in its patch depends on the view of it, and the map follows: as that
-  /// turned in the last `interval_s`, each feature moved at random across its ray from the camera,
-  /// a random walk of FilterOptions::corner_wander_px for a radian, times what `in_that_of_most`
-  /// says of each of features(); empty: all are like most. After predict(interval_s).
-  void letCornersWander(const CameraModel& camera, double interval_s,
-                        const std::vector<double>& in_that_of_most = {});
+  /// Landmark process noise: where a corner lies in its patch depends on the view of it. As that
+  /// turned in the last `interval_s`, each landmark moved across its ray from the camera by a
+  /// random walk of `sigma_px` per axis and root of a radian. After predict(interval_s).
+  void addLandmarkNoise(const CameraModel& camera, double interval_s, double sigma_px);
 
-  /// The camera may have slowed down: it keeps a share of its velocities, 0 to 1; what they lose is
-  /// one standard deviation more of them.
-  void doubtVelocity(double share);
+  /// Velocities decay to `fraction` of themselves, 0 to 1; what they lose is one standard deviation
+  /// more of them (covariance inflation).
+  void decayVelocity(double fraction);
 
   /// New feature seen at `pixel` in the present camera; returns its id, or -1 when the pixel can't
   /// be unprojected. Zero `inverse_depth`, `sigma_inverse_depth` and `sigma_px` (of the pixel, per
@@ -101,25 +108,26 @@ class Ekf {
   /// Turns features whose depth is well known into points by the linearity index; returns which.
   std::vector<FeatureId> convertToPoints();
 
-  /// `instead`: S as if the last predict() had allowed for these accelerations in place of the
-  /// options' (until the state changes otherwise).
+  /// `sigma_px`: of the measurements, per axis; 0: FilterOptions::sigma_px. `instead`: S as if the
+  /// last predict() had allowed for these accelerations in place of the options' (until the state
+  /// changes otherwise).
   PredictedMeasurements predictMeasurements(
-      const CameraModel& camera, const std::vector<FeatureId>& ids,
+      const CameraModel& camera, const std::vector<FeatureId>& ids, double sigma_px = 0.0,
       const std::optional<Accelerations>& instead = std::nullopt) const;
-  /// Corrects the state. All measurements are fused at once. Errors of matches last for some images
-  /// (FeatureMeasurement::repetitions): the map, the calibration and what was known of the camera
-  /// before are corrected by the noise that lasts; once these are known, the impulse of the last
-  /// predict(), which is anew in each image, by that of one image. Of the calibration's correction
-  /// only FilterOptions::calibration_share is made, and its covariance says so: a partial update
-  /// (Brink 2017, Partial-Update Schmidt-Kalman Filter).
+  /// Corrects the state by all measurements at once (RobustUpdate). Where errors are correlated
+  /// over time (variance_inflation), map, calibration and what was known of the camera before learn
+  /// by the inflated R; once these are known, the impulse of the last predict(), which is
+  /// independent of the past, by R.
   UpdateReport update(const CameraModel& camera,
-                      const std::vector<FeatureMeasurement>& measurements);
+                      const std::vector<FeatureMeasurement>& measurements,
+                      const NoisePrior& noise = {});
 
   /// Takes the present map's scale as the unit: fuses, without moving the mean, that the mean
   /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this
   /// only chooses the gauge, and keeps what follows from changing the unit.
   void fixScale(double relative_sigma);
-  /// How well a start is taken to know the unit that it chooses.
+  /// Relative standard deviation of the unit that a start chooses. Derivation: it fixes a gauge, so
+  /// that any value far below the errors of lengths, of some 1e-2, and far above rounding will do.
   static constexpr double kFreeScaleSigma = 2e-4;
 
   /// Multiplies all lengths (map, position, velocity and their covariances) by `factor` > 0.

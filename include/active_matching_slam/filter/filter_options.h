@@ -16,20 +16,21 @@ struct FilterOptions {
   double sigma_acceleration_mps2 = 7.0;           ///< linear, per axis (eq. 3.6)
   double sigma_angular_acceleration_rps2 = 12.0;  ///< angular, per axis
   double sigma_px = 0.45;                         ///< measurement noise, per axis
-  double minimum_sigma_px = 0.01;                 ///< of matches that show less; see MatchNoise
-  double corner_wander_px = 0.022;                ///< per axis and root of a radian; see Ekf
+  /// Least noise of a match: what template matching reaches on natural images (Ackermann 1984).
+  double minimum_sigma_px = 0.1;
+  double noise_memory_s = 0.1;     ///< within which the noise of matches may change
+  double landmark_noise_px = 0.2;  ///< process noise per axis and root of a radian; see Ekf
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
   /// How far the calibration is trusted; what images tell corrects it. 0: beyond doubt.
   double initial_sigma_readout_s = 0.01;
-  double initial_sigma_focal = 0.00004;  ///< these: see LensCorrection
-  double initial_sigma_radial = 0.0002;
-  double initial_sigma_centre = 0.000025;
+  /// These: see LensCorrection. As bundle-adjusted calibrations of good practice are repeatable
+  /// (.1 %, half a pixel of 500).
+  double initial_sigma_focal = 0.001;
+  double initial_sigma_radial = 0.002;
+  double initial_sigma_centre = 0.001;
   /// The lens's three are so many times as large where no distortion was calibrated.
-  double uncalibrated_factor = 50.0;
-  /// Of each correction of the calibration, how much is made: 1 where errors of matches are white;
-  /// those of images last, and teach less than so many of them should. See Ekf::update().
-  double calibration_share = 0.6;
+  double uncalibrated_factor = 5.0;
   double initial_inverse_depth = 1.0;        ///< rho_0 of a new feature [1/m]
   double initial_sigma_inverse_depth = 0.5;  ///< infinity within 2 sigma (Civera 2008)
   double linearity_threshold = 0.02;         ///< inverse depth -> point below (Civera 2008)

@@ -18,7 +18,8 @@ void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& cam
                 std::vector<FeatureState>& features);
 
 /// Gauge freedoms that a correction must leave as they were: rotation of the world (3) and scale
-/// (1). (Translation needs no care: its generator is the same everywhere.)
+/// (1). Derivation: of the seven of a similarity, translation needs no care: its generator is the
+/// same everywhere.
 constexpr int kGaugeFreedoms = 4;
 
 /// How every error answers to a small rotation of the world about its origin (columns 0 to 2) and

@@ -7,7 +7,7 @@ struct ImageOptions {
   int template_size_px = 11;      ///< odd, 5 to 31: side of the correlated template
   int source_patch_size_px = 31;  ///< odd: stored at first sight, large enough to be warped
   double match_threshold = 0.8;   ///< least ZNCC of a match, (0, 1)
-  double corner_quality = 0.2;    ///< Shi-Tomasi: least share of the strongest response
+  double corner_quality = 0.2;    ///< Shi-Tomasi: least fraction of the strongest response
   double minimum_contrast = 4.0;  ///< least standard deviation of a template [grey levels]
   int border_px = 8;              ///< features are not searched closer to the image border
 };

@@ -15,11 +15,11 @@ Eigen::Vector2d paraboloidPeak(const float scores[9]);
 /// Where a template fits the image best.
 struct TemplateFit {
   Eigen::Vector2d pixel;
-  /// Standard deviation per axis [px] that least squares makes of what is left between the two:
-  /// more than noise where the template is no longer what is seen.
+  /// Least-squares standard deviation per axis [px], from the residuals of the fit: above that of
+  /// the image noise where the patch has changed its appearance.
   double sigma_px = 0.0;
-  /// The same in two dimensions, in that of both axes on average: a covariance of trace 2. Along an
-  /// edge it is larger than across; a quarter is taken to be alike.
+  /// Least-squares covariance of the fit, normalised to trace 2 (mean variance of an axis 1) and
+  /// shrunk by a quarter towards the identity. Along an edge it is larger than across.
   Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
 };
 

@@ -8,7 +8,7 @@ namespace active_matching_slam {
 /// found: links of the tree are cut one by one, each time the one that costs least, and then
 /// exchanged as long as that gains. What remains in one piece alone preserves the more the larger
 /// it is, so no cut leaves a part with less than 1 / (3 submaps - 2) of the features: a quarter for
-/// two submaps, a third of an equal share for many. (Only where no such cut is left may parts be
+/// two submaps, a third of an equal part for many. (Only where no such cut is left may parts be
 /// half as large, and so on.)
 ///
 /// partitionIntoSubmaps() takes the tree's links in the order of the hierarchy instead, so that its

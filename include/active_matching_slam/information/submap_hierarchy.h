@@ -36,7 +36,7 @@ struct SubmapHierarchy {
 /// SubmapTracker for labels that persist. Throws as graphEdges() does.
 SubmapHierarchy buildSubmapHierarchy(MutualInformationGraph& graph);
 
-/// Share of the graph's information that a partition keeps: all links inside clusters and the
+/// Fraction of the graph's information that a partition keeps: all links inside clusters and the
 /// strongest link between each two clusters, over the sum of all links (Chli 2009, Table 6.1). 1
 /// for a graph without information. `labels` per node, 0 or more and below `clusters`; throws
 /// std::invalid_argument when they are not. O(edges + nodes).

@@ -31,11 +31,11 @@ SubmapPartition partitionOf(DisjointSets& sets, const std::vector<WeightedEdge>&
 SubmapPartition partitionIntoSubmaps(const MutualInformationGraph& graph,
                                      const SubmapHierarchy& hierarchy, int submaps);
 
-/// The most submaps that preserve at least `share` of the information, in [0, 1], of all partitions
-/// of the sequence from level 1 on. (At level 0 nothing is lost and nothing is grouped.) The last
-/// level preserves all, so there is always one.
+/// The most submaps that preserve at least `fraction` of the information, in [0, 1], of all
+/// partitions of the sequence from level 1 on. (At level 0 nothing is lost and nothing is grouped.)
+/// The last level preserves all, so there is always one.
 SubmapPartition partitionPreserving(const MutualInformationGraph& graph,
-                                    const SubmapHierarchy& hierarchy, double share);
+                                    const SubmapHierarchy& hierarchy, double fraction);
 
 /// Submaps of at most `features` (1 or more) features each: the merge sequence, leaving out each
 /// merge that would make a larger one.

@@ -91,7 +91,7 @@ double estimateSigma(const CameraModel& model, const Bundle& bundle);
 /// Multiplies the sigmas of each image's points by what their reprojection errors show against
 /// those of the median image: in one that is blurred all are worse (variance components; Foerstner
 /// 1979). The first image, against which all are measured, counts as the median.
-void weighImages(const CameraModel& model, Bundle* bundle);
+void estimateImageVariances(const CameraModel& model, Bundle* bundle);
 
 /// Rotates camera `index` so that the observed rays fit the features as seen from its position
 /// (Kabsch 1976).

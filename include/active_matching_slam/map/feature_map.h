@@ -7,7 +7,7 @@
 
 #include "active_matching_slam/camera/camera_model.h"
 #include "active_matching_slam/filter/ekf.h"
-#include "active_matching_slam/filter/match_noise.h"
+#include "active_matching_slam/filter/measurement_noise.h"
 #include "active_matching_slam/image/patch.h"
 #include "active_matching_slam/image/template.h"
 #include "active_matching_slam/image/warp.h"
@@ -27,12 +27,12 @@ struct MapFeature {
   FeatureRateStatistics rates;  ///< learnt for the matchers
   /// Innovation less the frame's median, averaged over about the last ten matches [px].
   Eigen::Vector2d drift_px = Eigen::Vector2d::Zero();
-  FeatureNoise noise;  ///< of its matches
+  LandmarkNoise noise;  ///< of its matches
   std::int64_t first_frame = 0;
   std::int64_t last_matched_frame = 0;
 };
 
-/// A feature that should be seen in the present image.
+/// A feature predicted to be visible in the present image.
 struct VisibleFeature {
   FeatureId id = -1;
   PatchView view;
@@ -47,7 +47,7 @@ struct SearchRecord {
   Eigen::Vector2d innovation_px = Eigen::Vector2d::Zero();  ///< of the accepted match
 };
 
-/// Which features exist and which are looked for. Means and covariances are the filter's; the two
+/// Which features exist and which are searched. Means and covariances are the filter's; the two
 /// hold the same ids at all times.
 class FeatureMap {
  public:
@@ -58,16 +58,16 @@ class FeatureMap {
 
   void clear();
   void add(MapFeature feature);
-  /// Forgets features that the filter has been told to remove.
+  /// Forgets features that the filter has removed.
   void retire(const std::vector<FeatureId>& ids);
-  /// Multiplies all lengths by `factor` > 0, as the filter has been told to.
+  /// Multiplies all lengths by `factor` > 0, as the filter has.
   void rescale(double factor);
-  /// Puts the camera of each feature's first sight at `moved(first_frame, T_world_camera)`.
+  /// Puts the camera of each feature's first view at `moved(first_frame, T_world_camera)`.
   void movePatches(
       const std::function<Eigen::Isometry3d(std::int64_t, const Eigen::Isometry3d&)>& moved);
 
   /// Features predicted in front of the camera, inside the image less `border_px`, and neither too
-  /// oblique nor too different in size from first sight, by flat views. Ascending id.
+  /// oblique nor too different in size from the first view, by flat views. Ascending id.
   std::vector<VisibleFeature> visible(const Ekf& filter, const CameraModel& camera,
                                       const MapOptions& options, double border_px) const;
 
@@ -76,18 +76,17 @@ class FeatureMap {
   std::vector<VisibleFeature> choose(const std::vector<VisibleFeature>& visible,
                                      const CameraModel& camera, int wanted) const;
 
-  /// Counts a frame's searches. A frame in which fewer than a third were matched speaks of the
-  /// image (blur, occlusion), not of the features, and counts for the matched ones only.
+  /// Counts a frame's searches. Where fewer than a third were matched, the image is at fault (blur,
+  /// occlusion) and not the features, and it counts for the matched ones only.
   void record(const std::vector<SearchRecord>& searches, std::int64_t frame);
 
   /// Learns how the surface of a feature is inclined, from its match at `pixel` of `image`, where
-  /// `expected` was looked for.
+  /// `expected` was searched.
   void learnSlope(const VisibleFeature& feature, const Template& expected, const cv::Mat& image,
                   const Eigen::Vector2d& pixel);
 
-  /// Learn how noisy the matches of a feature are: see FeatureNoise. Ignore unknown ids.
-  void seeNoise(FeatureId id, double sigma_px);
-  void learnNoise(FeatureId id, const Eigen::Vector2d& residual_px, double shown_px);
+  /// LandmarkNoise::learn(). Ignores unknown ids.
+  void learnNoise(FeatureId id, const Eigen::Vector2d& residual);
 
   /// How many of these features will probably be matched, by their recent record.
   double expectedMatches(const std::vector<VisibleFeature>& visible) const;
@@ -99,10 +98,12 @@ class FeatureMap {
   /// far: their matches leave the prediction always to one side, by far more than others do.
   std::vector<FeatureId> drifting() const;
 
-  /// The `count` features that inform least about the camera's present and near surroundings: those
-  /// whose first view is furthest from the present one, in direction and, in units of their depth,
-  /// in place, with what has not been matched lately counted as further. Never a known one.
-  std::vector<FeatureId> leastInformative(const Ekf& filter, int count) const;
+  /// The `count` features of least use to the camera where it is: with the largest sum of the angle
+  /// off the optical axis [rad], of the baseline from the first view over the distance (for a short
+  /// one the angle [rad] by which the view of it has turned), and of the recent failure rate (0 to
+  /// 1). A rule of thumb, each of the three about 1 where a feature is of no use any more; it
+  /// measures no information. Never a known one.
+  std::vector<FeatureId> leastUseful(const Ekf& filter, int count) const;
 
  private:
   MapFeature* findMutable(FeatureId id);  ///< null when unknown

@@ -8,7 +8,7 @@ struct MapOptions {
   int maximum_features = 150;       ///< the map never holds more
   double minimum_distance_px = 20;  ///< a new feature keeps from every predicted one
   double maximum_view_angle_deg = 60.0;
-  double minimum_scale = 0.5, maximum_scale = 2.0;  ///< scale change since first sight
+  double minimum_scale = 0.5, maximum_scale = 2.0;  ///< scale change since the first view
   int retire_after_attempts = 10;                   ///< a feature searched this often ...
   double retire_success_ratio = 0.5;                ///< ... is retired when it matched less often
 };

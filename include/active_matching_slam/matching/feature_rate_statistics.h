@@ -6,15 +6,15 @@
 
 namespace active_matching_slam {
 
-/// What is believed of a feature's rates before it was ever searched, and how firmly.
+/// Beta priors of a feature's detection rates: means, and strengths in pseudo-observations.
 struct FeatureRatePrior {
   FeatureRates mean;
-  double searches = 10.0;   ///< the belief in true_positive counts as much as this many searches
-  double pixels = 20000.0;  ///< the belief in false_positive counts as much as this many pixels
+  double searches = 10.0;   ///< strength of the prior of true_positive [searches]
+  double pixels = 20000.0;  ///< strength of the prior of false_positive [pixels]
 };
 
-/// How often a feature's searches told the truth so far (Chli 2009, sections 5.3.3 and 5.4.1). A
-/// plain value: it can be stored with the feature.
+/// Detection statistics of a feature so far (Chli 2009, sections 5.3.3 and 5.4.1). A plain value:
+/// it can be stored with the feature.
 struct FeatureRateStatistics {
   std::int64_t successes = 0;  ///< matched at the accepted place
   std::int64_t failures = 0;   ///< searched at the accepted place without a match

@@ -19,12 +19,12 @@ struct SearchMatch {
   Eigen::Vector2d pixel;  ///< sub-pixel position [px]
   double score = 0.0;     ///< similarity, for images ZNCC in [-1, 1]
   int id = -1;            ///< stable within the feature; searches list matches by ascending id
-  double sigma_px = 0.0;  ///< per axis, as far as the image tells; 0: unknown
-  /// Covariance of its error in that of both axes on average (trace 2).
+  double sigma_px = 0.0;  ///< per axis, estimated from the image; 0: unknown
+  /// Covariance of its error, normalised to trace 2 (mean variance of an axis 1).
   Eigen::Matrix2d noise_shape = Eigen::Matrix2d::Identity();
 };
 
-/// What one search brought.
+/// Result of one search.
 struct SearchOutcome {
   std::vector<int> matches;   ///< indices into FeatureSearch::matches(feature), ascending by id
   int pixels_in_ellipse = 0;  ///< integer pixel centres in the ellipse and in the valid area

@@ -15,32 +15,34 @@ enum class UpdateRule {
 
 /// Settings of the matchers. Each states which matchers read it.
 struct MatchOptions {
-  FeatureRates default_rates;     ///< mixture matchers: for features without rates of their own
-  bool use_feature_rates = true;  ///< false: the default rates for all
+  FeatureRates default_rates;  ///< mixture matchers: for a prior without rates
 
   // Mixture of Gaussians: active, fast_active, chow_liu.
   UpdateRule update_rule = UpdateRule::kIncremental;
   double prune_weight = 0.001;  ///< Gaussians below are dropped, [0, 1)
-  /// Rule incremental: at the end all hypotheses, some of the dropped ones too, are judged anew by
-  /// all that was found, and the most probable one is accepted; else the heaviest Gaussian is.
-  bool recount = true;
-  /// A Gaussian that has weighed this, and has lost most of it to matches of others before it was
-  /// searched itself, is not dropped until it has been, which is done at once; 0: never.
-  double hearing_weight = 0.01;
-  /// With recount, when the accepted hypothesis misses more features than their rates explain: so
-  /// many of those that were likely once are searched to their end too, and judged with it.
-  int runners_up = 2;
+  /// Rule incremental: at the end all hypotheses, and some of the pruned ones, are re-scored by the
+  /// joint evidence of all matches, and the most probable one is accepted; else the heaviest
+  /// Gaussian is.
+  bool joint_rescoring = true;
+  /// Deferred pruning: a Gaussian that once reached this weight is not pruned before it has been
+  /// searched itself (confirmed or refuted by its own measurements); once its weight has fallen to
+  /// a fifth of its maximum that search is done next; 0: never.
+  double deferred_pruning_weight = 0.01;
+  /// With joint_rescoring: when the accepted hypothesis has more missed detections than the
+  /// features' rates explain, as many of its strongest alternatives are searched to completion too
+  /// and re-scored with it.
+  int k_best = 2;
   int max_gaussians = 0;  ///< cap on the live mixture; the lightest go first; 0: no cap
-  /// Siblings, Gaussians born of one search, become one where they differ by less than so many
-  /// sigma in what they expect of every other feature; 0: never. The better one stays, with the
-  /// weight of both.
+  /// Siblings, Gaussians born of one search, are merged where their predictions of every other
+  /// feature differ by less than this many sigma; 0: never. The better one stays, with the weight
+  /// of both.
   double merge_sigmas = 0.0;
-  /// Which of the merged matches is right may stay open: the better one is accepted only if its
-  /// probability among them, by position and similarity, is at least this.
-  double merge_share = 0.9;
+  /// Of merged matches the better one is accepted only if its probability among them, by position
+  /// and similarity, is at least this; else the feature is left unmatched.
+  double merge_probability = 0.9;
   double latch_information_bits = 0.0;  ///< stop rule (a): below, no more MI is computed; 0: never
-  /// Stop rule: done when the heaviest Gaussian weighs at least this and has no feature left to
-  /// search; 0: never, the search goes on until no Gaussian has a candidate.
+  /// Stop rule of the reference traces (golden vectors, am_finish): done when the heaviest Gaussian
+  /// weighs at least this and has no feature left to search; 0: never.
   double finish_weight = 0.0;
   double ambiguous_below_weight = 0.0;  ///< a result of less weight is marked ambiguous; 0: never
   int fast_candidates = 15;             ///< fast_active: candidates evaluated a step
@@ -54,10 +56,6 @@ struct MatchOptions {
   /// The budget's milliseconds come from a model of the work done and not from the clock: the same
   /// result on every machine, every time.
   bool modelled_time = false;
-  /// auto: active is taken while its modelled cost is below this (and below max_milliseconds, if
-  /// set), and beyond if chow_liu would not halve it, as with less than about 130 features. The
-  /// model counts features and expected matches; no clock decides.
-  double auto_milliseconds = 10.0;
   /// Monotonic clock of the budget, unless that is modelled, and of the reported durations, in
   /// seconds; empty: steady_clock.
   std::function<double()> clock_s;
@@ -74,8 +72,8 @@ struct MatchOptions {
   bool keep_trace = false;  ///< record every step in MatchResult::trace
 };
 
-/// Share of the frame's budgets that so much uses up, of the tightest; 0 without a budget.
-double shareOfBudget(const MatchOptions& options, std::int64_t pixels, double milliseconds);
+/// Fraction of the frame's tightest budget that this cost uses up; 0 without a budget.
+double fractionOfBudget(const MatchOptions& options, std::int64_t pixels, double milliseconds);
 
 /// Throws std::invalid_argument with name, value and allowed range.
 void checkMatchOptions(const MatchOptions& options);

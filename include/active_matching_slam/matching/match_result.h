@@ -13,7 +13,7 @@ namespace active_matching_slam {
 struct MatchHypothesis {
   int gaussian = -1;  ///< id in the trace; parent as there
   int parent = -1;
-  /// By the recount; without one, the weight in the mixture.
+  /// Posterior by joint re-scoring; without it, the weight in the mixture.
   double probability = 0.0;
   std::vector<int> match_of_feature;  ///< F: index into FeatureSearch::matches(feature), or -1
 };
@@ -74,8 +74,8 @@ struct MatchStatistics {
 /// The outcome of a frame. Match indices point into FeatureSearch::matches(feature).
 struct MatchResult {
   std::vector<int> match_of_feature;  ///< F: accepted match, or -1. When ambiguous: only what all
-                                      ///< strong hypotheses share; never one of twin matches that
-                                      ///< were merged and left open
+                                      ///< strong hypotheses have in common; never one of merged
+                                      ///< matches below merge_probability
   std::vector<MatchHypothesis> hypotheses;      ///< heaviest first; never empty when F > 0
   std::vector<std::pair<int, int>> tree_edges;  ///< chow_liu: (i, j), i < j; else empty
   MatchStatistics statistics;

@@ -28,7 +28,7 @@ class Matcher {
 };
 
 /// `name`: active_search, jcbb, one_point_ransac, active, fast_active, chow_liu, or auto (active
-/// while its measured cost fits the budget, chow_liu beyond where that costs half). Throws
+/// while its modelled cost fits the budget, chow_liu beyond where that costs half). Throws
 /// std::invalid_argument that lists these for any other name.
 std::unique_ptr<Matcher> createMatcher(const std::string& name);
 const std::vector<std::string>& matcherNames();

@@ -8,7 +8,7 @@
 
 namespace active_matching_slam {
 
-/// How often a feature's search tells the truth (Chli 2009, section 5.3.3).
+/// Detection rates of a feature's search (Chli 2009, section 5.3.3).
 struct FeatureRates {
   double true_positive = 0.9;    ///< Ptp: probability of a match where the feature is, in (0, 1)
   double false_positive = 1e-4;  ///< Pfp: probability of a spurious match per pixel, in (0, 1)

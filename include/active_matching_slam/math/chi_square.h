@@ -2,7 +2,8 @@
 
 namespace active_matching_slam {
 
-/// The x with P(chi-square of 2 * `pairs` degrees of freedom <= x) = `probability`, pairs >= 1.
-double chiSquareQuantile(int pairs, double probability);
+/// The x with P(chi-square of `degrees` degrees of freedom <= x) = `probability`. Throws
+/// std::domain_error unless degrees > 0 and 0 <= probability < 1.
+double chiSquareQuantile(double degrees, double probability);
 
 }  // namespace active_matching_slam

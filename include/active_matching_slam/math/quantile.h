@@ -7,11 +7,11 @@
 
 namespace active_matching_slam {
 
-/// The value above so great a share, in [0, 1), of the others; 0 of none. None may be NaN.
-inline double quantileOf(std::vector<double> values, double share) {
+/// The value above a fraction, in [0, 1), of the others; 0 of none. None may be NaN.
+inline double quantileOf(std::vector<double> values, double fraction) {
   if (values.empty()) return 0.0;
   const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
+      values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size()));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }

@@ -57,11 +57,11 @@ visualization_msgs::MarkerArray cameraMarkers(const TrackedFrame& frame,
 class MarkerHistory {
  public:
   /// So often is a deletion repeated: a viewer that is busy drawing misses messages.
-  static constexpr std::int64_t kRepetitions = 100;
+  static constexpr std::int64_t kDeletionRepeats = 100;
 
-  /// Appends a deletion for each marker of the last kRepetitions messages that is not among these;
-  /// begins with a deletion of all after restart(), which also serves a viewer that joins late.
-  /// Deletions carry the header too: a message has one stamp, whatever it says.
+  /// Appends a deletion for each marker of the last kDeletionRepeats messages that is not among
+  /// these; begins with a deletion of all after restart(), which also serves a viewer that joins
+  /// late. Deletions carry the header too: a message has one stamp, whatever it says.
   void complete(const std_msgs::Header& header, visualization_msgs::MarkerArray* markers);
   void restart() { restart_ = true; }
 

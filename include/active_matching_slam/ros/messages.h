@@ -8,7 +8,8 @@
 // The message generator puts a package's messages into the namespace of the package, where several
 // names (TrackingState, SubmapHierarchy, ...) belong to the core library. Here, and for this
 // package's own sources only, they live in `ams_msgs`; names on the wire and checksums are
-// untouched.
+// untouched. (gencpp has no option for the namespace: without the macro it takes a package for the
+// messages alone, which users expect in msg/ and srv/ of this one.)
 #define active_matching_slam ams_msgs
 #include <active_matching_slam/FeatureArray.h>
 #include <active_matching_slam/LoadMap.h>

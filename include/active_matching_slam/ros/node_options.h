@@ -7,14 +7,6 @@
 
 namespace active_matching_slam {
 
-/// The tracker's settings in a node, which must keep up with the camera: the core's, and a bound on
-/// the time that matching a frame may take.
-inline TrackerOptions liveTrackerOptions() {
-  TrackerOptions options;
-  options.matching.max_milliseconds = 20.0;
-  return options;
-}
-
 /// Settings of the ROS side; those of the tracker itself are TrackerOptions.
 struct NodeOptions {
   std::string image_transport = "raw";
@@ -56,7 +48,7 @@ void visitNodeOptions(Options& o, Visitor&& visit) {
   visit(F{"camera_frame", "optical frame of the camera; empty: what the images say", false},
         o.camera_frame);
   visit(F{"base_frame",
-          "body frame whose pose tf and ~odometry tell, found through tf; empty: the "
+          "body frame whose pose tf and ~odometry give, found through tf; empty: the "
           "camera's own",
           false},
         o.base_frame);
@@ -100,10 +92,9 @@ void visitNodeOptions(Options& o, Visitor&& visit) {
   visit(F{"draw/minimum_link_bits",
           "weaker links are left out of ~markers/mutual_information and ~debug_image [bit]", true},
         o.draw.minimum_link_bits, 0.0, 100.0);
-  visit(
-      F{"draw/links_per_feature",
-        "so many of each feature's links are shown there, the strongest; the tree's besides", true},
-      o.draw.links_per_feature, 0, 10000);
+  visit(F{"draw/links_per_feature",
+          "largest number of links shown of each feature, the strongest; the tree's besides", true},
+        o.draw.links_per_feature, 0, 10000);
 }
 
 /// Throws std::invalid_argument naming the setting: ranges, tf_mode, frames that are equal or

@@ -34,7 +34,7 @@ class PoseBroadcaster {
   void reset(bool time_jumped);
 
   /// T_camera_base at the image's time; identity without base_frame, empty when tf does not know it
-  /// (said, throttled).
+  /// (logged, throttled).
   std::optional<Eigen::Isometry3d> cameraFromBase(const std::string& camera_frame,
                                                   const ros::Time& stamp);
 

@@ -6,12 +6,12 @@
 
 namespace active_matching_slam {
 
-/// A warning that may hold for every image: said at once, and again only after a while of real
+/// A warning that may hold for every image: logged at once, and again only after a while of real
 /// time. (The macros of rosconsole that do this share their clock between all trackers of a
 /// process.)
 class RepeatedWarning {
  public:
-  /// `cause`: what makes two warnings the same; another cause is said at once.
+  /// `cause`: what makes two warnings the same; another cause is logged at once.
   void say(const std::string& cause, const std::string& text) {
     const ros::WallTime now = ros::WallTime::now();
     if (cause == cause_ && (now - said_).toSec() < kPeriod_s) return;

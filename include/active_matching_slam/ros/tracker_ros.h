@@ -24,7 +24,7 @@ namespace active_matching_slam {
 
 /// All settings of a node, as read from its private namespace.
 struct NodeSettings {
-  TrackerOptions tracker = liveTrackerOptions();
+  TrackerOptions tracker;
   NodeOptions node;
 };
 /// Throws std::invalid_argument or std::runtime_error naming the parameter (or file) at fault.

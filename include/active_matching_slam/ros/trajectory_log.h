@@ -20,7 +20,7 @@ class TrajectoryLog {
   void add(const TrackedFrame& frame);
   void clear() { poses_.clear(); }
   std::size_t size() const { return poses_.size(); }
-  /// After the map's unit changed; what was written before keeps its own.
+  /// After the map's scale changed; what was written before keeps its own.
   void rescale(double factor);
 
   /// The last `length` poses.

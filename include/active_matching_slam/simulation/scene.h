@@ -18,7 +18,7 @@ struct Surface {
   /// CV_32FC1, reflectance in [0, 1]; spans the rectangle exactly: the centre of texel (i, j) of an
   /// n x m image lies at u = (i + 0.5) / n * width_m, v = (j + 0.5) / m * height_m.
   cv::Mat albedo;
-  double emission = 0.0;  ///< share of the albedo that shines by itself, independent of lights
+  double emission = 0.0;  ///< fraction of the albedo that shines by itself, independent of lights
   bool casts_shadow = true;
 
   Eigen::Vector3d normal() const { return v_axis.cross(u_axis); }

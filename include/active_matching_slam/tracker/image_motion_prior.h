@@ -10,7 +10,7 @@
 namespace active_matching_slam {
 
 /// The shift of the image, without a turn, that the prediction has on average. `before_px` holds
-/// for each feature where it was in the image before, empty where it was not to be seen.
+/// for each feature where it was in the image before, empty where it was not in view.
 ImageMotion predictedImageMotion(const MeasurementPrior& prior,
                                  const std::vector<std::optional<Eigen::Vector2d>>& before_px);
 

@@ -19,7 +19,7 @@ struct KnownStart {
   double reprojection_rms_px = 0.0;
 };
 
-/// Looks for every known point within `search_px` of where it is expected (its template by
+/// Searches every known point within `search_px` of where it is expected (its template by
 /// correlation; without one, the corners there), and takes the combination of responses that a
 /// single camera explains best. Empty, with the cause in `reason`, when a point has no response or
 /// no camera explains them within 2 px.

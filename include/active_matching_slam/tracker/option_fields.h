@@ -25,11 +25,11 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matcher);
   visit(F{"learn_rates", "learn how often each feature is matched rightly and wrongly", true},
         o.learn_rates);
-  visit(F{"second_opinion",
+  visit(F{"fallback_matchers",
           "when far fewer match than should, match again by the motion of the whole image, jcbb, "
           "one_point_ransac",
           true},
-        o.second_opinion);
+        o.fallback_matchers);
   visit(F{"structure", "maintain the graph of mutual information and the submaps", true},
         o.structure);
   visit(
@@ -42,6 +42,9 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.structure_accelerations.angular_rps2, 0.0, 1e3);
   visit(F{"known_points_search_px", "how far a known point may lie from its image_px [px]", false},
         o.known_points_search_px, 1.0, 200.0);
+  visit(F{"known_points_sigma_m",
+          "accuracy of the known points' positions, standard deviation per axis [m]", false},
+        o.known_points_sigma_m, 1e-6, 1.0);
   visit(F{"max_frame_interval_s",
           "after a longer gap between stamps the whole image is searched for the map first [s]",
           true},
@@ -60,16 +63,20 @@ void visitOptions(Options& o, Visitor&& visit) {
   visit(F{"filter/sigma_angular_acceleration_rps2",
           "angular acceleration, standard deviation per axis [rad/s^2]", true},
         o.filter.sigma_angular_acceleration_rps2, 1e-3, 1e3);
-  visit(F{"filter/sigma_px", "noise of a matched image point, per axis [px]", true},
+  visit(F{"filter/sigma_px",
+          "noise of a match before any is learnt, and where its template's fit does not converge, "
+          "per axis [px]",
+          true},
         o.filter.sigma_px, 0.05, 20.0);
   visit(F{"filter/minimum_sigma_px",
-          "updates trust matches that show less noise, down to this; sigma_px: never [px]", true},
+          "least noise that a match is taken to have, whatever residuals show [px]", true},
         o.filter.minimum_sigma_px, 0.01, 20.0);
-  visit(F{"filter/corner_wander_px",
-          "by how much a corner moves in its patch as the view of it turns, per axis and root of a "
-          "radian [px]",
+  visit(F{"filter/noise_memory_s", "time within which the noise of matches may change [s]", true},
+        o.filter.noise_memory_s, 1e-3, 1e3);
+  visit(F{"filter/landmark_noise_px",
+          "process noise of a landmark as the view of it turns, per axis and root of a radian [px]",
           true},
-        o.filter.corner_wander_px, 0.0, 20.0);
+        o.filter.landmark_noise_px, 0.0, 20.0);
   visit(F{"filter/initial_sigma_velocity_mps", "at start, per axis [m/s]", true},
         o.filter.initial_sigma_velocity_mps, 1e-3, 100.0);
   visit(F{"filter/initial_sigma_angular_velocity_rps", "at start, per axis [rad/s]", true},
@@ -91,10 +98,6 @@ void visitOptions(Options& o, Visitor&& visit) {
           "of the three before this, where camera_info has no distortion; 1 for rectified images",
           true},
         o.filter.uncalibrated_factor, 1.0, 100.0);
-  visit(F{"filter/calibration_share",
-          "of each correction of the calibration, how much is made; less than 1 since errors last",
-          true},
-        o.filter.calibration_share, 1e-3, 1.0);
   visit(F{"filter/initial_inverse_depth",
           "prior of a new feature; fixes the map unit when scale is "
           "free [1/m]",
@@ -116,7 +119,7 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.image.source_patch_size_px, 7, 101);
   visit(F{"image/match_threshold", "least zero-mean normalised cross-correlation of a match", true},
         o.image.match_threshold, 0.1, 0.999);
-  visit(F{"image/corner_quality", "least share of the strongest corner's response", true},
+  visit(F{"image/corner_quality", "least fraction of the strongest corner's response", true},
         o.image.corner_quality, 1e-6, 1.0);
   visit(F{"image/minimum_contrast", "least standard deviation of a template [grey levels]", true},
         o.image.minimum_contrast, 0.0, 128.0);
@@ -138,7 +141,7 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.map.maximum_scale, 1.0, 20.0);
   visit(F{"map/retire_after_attempts", "a feature searched this often may be retired", true},
         o.map.retire_after_attempts, 1, 100000);
-  visit(F{"map/retire_success_ratio", "... when it was matched less often than this share", true},
+  visit(F{"map/retire_success_ratio", "... when it was matched in less than this fraction", true},
         o.map.retire_success_ratio, 0.0, 1.0);
 
   visit(F{"matching/true_positive_rate", "probability of a match where a feature is (Ptp)", true},
@@ -149,28 +152,29 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.matching.update_rule);
   visit(F{"matching/prune_weight", "Gaussians below this weight are dropped", true},
         o.matching.prune_weight, 0.0, 0.5);
-  visit(F{"matching/recount", "judge all hypotheses anew at the end, dropped ones too", true},
-        o.matching.recount);
-  visit(F{"matching/hearing_weight",
-          "a Gaussian that has weighed this is not dropped before it has been searched itself; 0: "
-          "never",
+  visit(F{"matching/joint_rescoring",
+          "re-score all hypotheses by their joint evidence at the end, pruned ones too", true},
+        o.matching.joint_rescoring);
+  visit(F{"matching/deferred_pruning_weight",
+          "a Gaussian that once had this weight is not pruned before it was searched itself; 0: it "
+          "is",
           true},
-        o.matching.hearing_weight, 0.0, 1.0);
-  visit(F{"matching/runners_up",
-          "hypotheses that were likely once, and are searched to their end when the accepted one "
-          "misses too much; needs recount",
+        o.matching.deferred_pruning_weight, 0.0, 1.0);
+  visit(F{"matching/k_best",
+          "alternatives searched to completion when the accepted hypothesis has too many missed "
+          "detections; needs joint_rescoring",
           true},
-        o.matching.runners_up, 0, 100);
+        o.matching.k_best, 0, 100);
   visit(F{"matching/max_gaussians", "cap on the mixture; 0: none", true}, o.matching.max_gaussians,
         0, 100000);
-  visit(
-      F{"matching/merge_sigmas",
-        "Gaussians that differ in one match only, and in what they expect by less [sigma], become "
-        "one; 0: never",
-        true},
-      o.matching.merge_sigmas, 0.0, 10.0);
-  visit(F{"matching/merge_share", "probability at which one of such matches is accepted", true},
-        o.matching.merge_share, 0.0, 1.0);
+  visit(F{"matching/merge_sigmas",
+          "Gaussians that differ in one match, and in their predictions by less than this, merge "
+          "[sigma]; 0: never",
+          true},
+        o.matching.merge_sigmas, 0.0, 10.0);
+  visit(F{"matching/merge_probability",
+          "least probability, among merged matches, of one that is accepted", true},
+        o.matching.merge_probability, 0.0, 1.0);
   visit(F{"matching/latch_information_bits",
           "below, no more mutual information is computed [bit]; "
           "0: never",

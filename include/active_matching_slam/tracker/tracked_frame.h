@@ -29,7 +29,7 @@ std::string scaleSourceName(ScaleSource source);
 
 /// What became of a feature in this frame.
 enum class FeatureStatus {
-  kNotVisible,   ///< outside the image, behind, or seen too differently from its first sight
+  kNotVisible,   ///< outside the image, behind, or too different a view of it than the first
   kNotSearched,  ///< predicted visible but not chosen, or the budget ended first
   kMissed,       ///< searched, no match met
   kRejected,     ///< a match was met but not accepted
@@ -75,7 +75,7 @@ struct TrackedFrame {
   CameraState camera;
   /// 12 x 12, CameraError order (world-frame additive position, world-frame rotation vector, ...).
   MotionCovariance camera_covariance = MotionCovariance::Zero();
-  double match_sigma_px = 0.0;  ///< noise per axis of most matches; 0: none were asked for
+  double match_sigma_px = 0.0;  ///< noise per axis of most matches; 0: none were searched
   double nis = 0.0;
   int nis_degrees = 0;
 
@@ -98,8 +98,8 @@ struct TrackedFrame {
   FrameTimings timings_ms;
 };
 
-/// I(z_i; all others) in the prediction (Chli 2009, eq. 4.31), by feature [bit]. Costs O(F^3), and
-/// few ask: so it is no part of the frame.
+/// I(z_i; all others) in the prediction (Chli 2009, eq. 4.31), by feature [bit]. Costs O(F^3) and
+/// is rarely needed: so it is no part of the frame.
 std::unordered_map<FeatureId, double> predictedInformationBits(const TrackedFrame& frame);
 
 }  // namespace active_matching_slam

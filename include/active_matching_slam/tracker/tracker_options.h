@@ -42,16 +42,17 @@ struct TrackerOptions {
   MatchOptions matching = liveMatchOptions();
   std::vector<KnownPoint> known_points;  ///< empty: scale free, world = first camera frame
   double known_points_search_px = 15.0;  ///< how far each may lie from its image_px
-  double max_frame_interval_s = 0.5;     ///< after a longer gap the whole image is asked first
+  double known_points_sigma_m = 5e-4;    ///< of their positions, per axis
+  double max_frame_interval_s = 0.5;     ///< after a longer gap the whole image is searched first
   int lost_after_frames = 15;            ///< consecutive frames with too few matches
   int minimum_matches = 4;               ///< fewer is 'too few'
   double reset_when_lost_after_s = 0.0;  ///< 0: never reset, keep looking for the map
   bool learn_rates = true;               ///< of each feature's true and false matches
-  bool second_opinion = true;            ///< match again in other ways when few match
+  bool fallback_matchers = true;         ///< where few match, see MatchCascade
   bool structure = false;                ///< maintain the MI graph and the submaps
   /// What the graph's mutual information expects of the camera from one image to the next. (Search
-  /// regions are for jerks too, and a jerk turns: that moves near and far alike, and drowns what
-  /// parts them.)
+  /// regions allow for jerks too, and a jerk turns: that moves near and far alike, and hides the
+  /// differences between them.)
   Accelerations structure_accelerations = {4.0, 3.0};
 };
 

@@ -1,4 +1,4 @@
-#include "search_ledger.h"
+#include "budgeted_search.h"
 
 #include <algorithm>
 #include <chrono>
@@ -17,15 +17,15 @@ double steadySeconds() {
 
 }  // namespace
 
-SearchLedger::SearchLedger(const ProperPrior& prior, FeatureSearch& search,
-                           const MatchOptions& options)
+BudgetedSearch::BudgetedSearch(const ProperPrior& prior, FeatureSearch& search,
+                               const MatchOptions& options)
     : prior_(prior),
       search_(search),
       options_(options),
       clock_s_(options.clock_s ? options.clock_s : steadySeconds),
       start_s_(clock_s_()) {}
 
-SearchOutcome SearchLedger::search(int feature, const SearchEllipse& ellipse) {
+SearchOutcome BudgetedSearch::search(int feature, const SearchEllipse& ellipse) {
   const double start = now();
   SearchOutcome outcome = search_.search(prior_.original(feature), ellipse);
   correlation_s_ += now() - start;
@@ -35,13 +35,13 @@ SearchOutcome SearchLedger::search(int feature, const SearchEllipse& ellipse) {
   return outcome;
 }
 
-double SearchLedger::budgetUsed() const {
+double BudgetedSearch::fractionUsed() const {
   // The clock is read only if it counts.
-  return shareOfBudget(options_, pixels_,
-                       options_.max_milliseconds > 0.0 ? spentMilliseconds() : 0.0);
+  return fractionOfBudget(options_, pixels_,
+                          options_.max_milliseconds > 0.0 ? spentMilliseconds() : 0.0);
 }
 
-MatchResult SearchLedger::begin(const char* matcher) const {
+MatchResult BudgetedSearch::begin(const char* matcher) const {
   MatchResult result;
   const int total = prior_.size() + prior_.leftOut();
   result.match_of_feature.assign(static_cast<std::size_t>(total), -1);
@@ -54,7 +54,7 @@ MatchResult SearchLedger::begin(const char* matcher) const {
   return result;
 }
 
-void SearchLedger::finish(MatchResult& result) const {
+void BudgetedSearch::finish(MatchResult& result) const {
   MatchStatistics& s = result.statistics;
   s.matched = 0;
   for (const int match : result.match_of_feature) s.matched += match >= 0;

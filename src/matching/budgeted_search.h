@@ -9,11 +9,11 @@
 
 namespace active_matching_slam {
 
-/// The search of a frame seen through the proper features of its prior, with its costs written
-/// down.
-class SearchLedger {
+/// The feature search of a frame, indexed by the proper features of its prior, that accounts for
+/// its cost against the budgets of the options.
+class BudgetedSearch {
  public:
-  SearchLedger(const ProperPrior& prior, FeatureSearch& search, const MatchOptions& options);
+  BudgetedSearch(const ProperPrior& prior, FeatureSearch& search, const MatchOptions& options);
 
   /// Searches the feature (index in the proper prior).
   SearchOutcome search(int feature, const SearchEllipse& ellipse);
@@ -31,14 +31,14 @@ class SearchLedger {
   double elapsedMilliseconds() const { return 1e3 * (now() - start_s_); }
   /// Adds to the modelled time.
   void charge(double milliseconds) { modelled_ms_ += milliseconds; }
-  /// What counts against the budget of time.
+  /// Time that counts against the budget.
   double spentMilliseconds() const {
     return options_.modelled_time ? modelled_ms_ : elapsedMilliseconds();
   }
   std::int64_t pixelsSearched() const { return pixels_; }
-  /// Share used up of the options' budgets, of the tightest.
-  double budgetUsed() const;
-  bool isOverBudget() const { return budgetUsed() >= 1.0; }
+  /// Fraction used up of the tightest of the options' budgets.
+  double fractionUsed() const;
+  bool isOverBudget() const { return fractionUsed() >= 1.0; }
 
   /// Starts a result: sizes, name, candidates, full gates.
   MatchResult begin(const char* matcher) const;

@@ -9,19 +9,14 @@
 #include <string>
 #include <tuple>
 
+#include "accuracy/long_runs.h"
+#include "accuracy/simulated_run.h"
 #include "active_matching_slam/evaluation/consistency.h"
-#include "active_matching_slam/evaluation/run_summary.h"
-#include "active_matching_slam/simulation/simulator.h"
-#include "active_matching_slam/tracker/tracker.h"
 
 namespace active_matching_slam {
 namespace {
 
-struct SimulatedRun {
-  int first_untracked = -1;
-  std::vector<FrameRecord> records;
-  RunTruth truth;
-};
+using test::SimulatedRun;
 
 SimulatedRun trackSimulation(const std::string& motion, std::uint64_t seed,
                              const std::string& scene = "room") {
@@ -33,16 +28,7 @@ SimulatedRun trackSimulation(const std::string& motion, std::uint64_t seed,
   simulation.height = 240;
   simulation.duration_s = 10.0;
   Simulator simulator(simulation);
-  Tracker tracker(simulator.camera(), TrackerOptions());
-  SimulatedRun run;
-  run.truth.simulated = true;
-  while (const auto image = simulator.next()) {
-    run.records.push_back(recordOf(*tracker.track(image->image, image->stamp_s)));
-    run.truth.trajectory.push_back({image->stamp_s, image->truth.T_world_camera});
-    if (!run.records.back().isTracked() && run.first_untracked < 0)
-      run.first_untracked = image->index;
-  }
-  return run;
+  return test::trackSimulation(&simulator, simulator.camera().calibration(), TrackerOptions());
 }
 
 /// Normalised squared errors of the poses from 1 s after the start on (before, the start pose,
@@ -56,7 +42,9 @@ std::vector<double> poseNees(const SimulatedRun& run) {
 }
 
 /// Scenes that go from near to very far, in which the first images are most easily misread.
-TEST(SimulatedDepths, OfAllKindsAreReadRightlyFromTheFirstImages) {
+class LongSimulatedDepths : public test::LongRuns {};
+
+TEST_F(LongSimulatedDepths, OfAllKindsAreReadRightlyFromTheFirstImages) {
   for (const auto& [scene, motion] :
        {std::make_pair("corridor", "slow"), std::make_pair("office", "forward")}) {
     const SimulatedRun run = trackSimulation(motion, 11, scene);
@@ -70,14 +58,14 @@ TEST(SimulatedDepths, OfAllKindsAreReadRightlyFromTheFirstImages) {
   }
 }
 
-class SimulatedSequences : public testing::TestWithParam<std::tuple<const char*, int>> {};
+class LongSimulatedSequences : public test::LongRuns,
+                               public testing::WithParamInterface<std::tuple<const char*, int>> {};
 
-TEST_P(SimulatedSequences, AreTrackedToTheEndWithinOnePercentOfThePath) {
+TEST_P(LongSimulatedSequences, AreTrackedToTheEndWithinOnePercentOfThePath) {
   const auto [motion, seed] = GetParam();
   const SimulatedRun run = trackSimulation(motion, static_cast<std::uint64_t>(seed));
   const RunSummary summary = summarise(run.records, run.truth);
-  EXPECT_EQ(summary.frames_tracked, summary.frames)
-      << "first frame without a pose: " << run.first_untracked;
+  EXPECT_EQ(summary.frames_tracked, summary.frames);
   ASSERT_TRUE(summary.ate_sim3_m);
   const double error = *summary.ate_sim3_m;
   const double path = measureExcursion(run.truth.trajectory).path_length;
@@ -96,10 +84,10 @@ TEST_P(SimulatedSequences, AreTrackedToTheEndWithinOnePercentOfThePath) {
       "room %s seed %d: %d of %d frames tracked, error %.2f mm = %.3f %% of %.2f m; pose NEES "
       "(6 degrees) mean %.1f median %.1f, %.0f %% within 95 %% bounds\n",
       motion, seed, summary.frames_tracked, summary.frames, 1e3 * error, 100.0 * error / path, path,
-      mean, nees[nees.size() / 2], 100.0 * shareWithin(nees, chiSquareMeanBounds(6, 1)));
+      mean, nees[nees.size() / 2], 100.0 * fractionWithin(nees, chiSquareMeanBounds(6, 1)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Room, SimulatedSequences,
+INSTANTIATE_TEST_SUITE_P(Room, LongSimulatedSequences,
                          testing::Combine(testing::Values("slow", "jerky"), testing::Values(1, 2)));
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "measurement_update.h"
+#include "robust_update.h"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -6,38 +6,41 @@
 #include <utility>
 
 #include "active_matching_slam/filter/state_error.h"
+#include "active_matching_slam/math/quantile.h"
 #include "active_matching_slam/math/triangular.h"
 
 namespace active_matching_slam {
 namespace {
 
 constexpr int kMotion = CameraError::kMotionSize;
-/// Linearisation is repeated when it missed by more than this, root mean square, in sigmas.
+/// Linearised anew while the last linearisation erred in the predictions by more than this fraction
+/// of their standard deviation, root mean square. Cost: each costs as much as a whole update.
 constexpr double kNonlinearityTolerance = 0.2;
-/// Of the t distribution of what matches are off by: degrees of freedom, and the variance in that
-/// of Gaussian noise for which the covariance is right if the noise is Gaussian after all.
-constexpr double kTailDegrees = 4.0, kTailVariance = 1.18;
-constexpr double kTailTolerance = 0.02;  ///< of the variances
-constexpr int kMostTailRounds = 4;
-/// Degrees of freedom for which the noise common to an image's matches is taken to be as expected,
-/// and the innovation's square, for each of its own, that says that it is. (By NEES over rendered
-/// runs.)
-constexpr double kDegreesLikeExpected = 80.0, kExpectedInnovation = 0.85;
+/// Degrees of freedom of the t distribution of errors (Standard: Lange, Little & Taylor 1989).
+constexpr double kTailDegrees = 4.0;
+/// Factor of all variances by which the covariance is right where errors are Gaussian after all.
+/// Derivation: for weights w(x) = 6 / (4 + x), x chi-square of 2 degrees, the estimate is taken to
+/// have the variance 1 / E[w], E[w] = 1.0840, and has E[w^2 x / 2] / E[w + x w']^2 = 1.0919 (Huber
+/// 1981); their ratio.
+constexpr double kTailVariance = 1.1836;
+/// Mean of a Gaussian error's weighted square per degree of freedom. Derivation: E[w x] / 2.
+constexpr double kTailSquare = 0.8320;
+constexpr double kTailTolerance = 0.02;  ///< Cost: of the variances, where reweighing ends
+constexpr int kMostTailRounds = 4;       ///< Cost
 
 }  // namespace
 
-MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState& camera,
-                                     const std::vector<FeatureState>& features,
-                                     const CovarianceMatrix& covariance,
-                                     std::vector<UsableMeasurement> measurements,
-                                     double calibration_share, const ImpulseRoot& impulse,
-                                     Eigen::Ref<Eigen::MatrixXd> X)
+RobustUpdate::RobustUpdate(const CameraModel& model, const CameraState& camera,
+                           const std::vector<FeatureState>& features,
+                           const CovarianceMatrix& covariance,
+                           std::vector<UsableMeasurement> measurements, const NoisePrior& noise,
+                           const ImpulseRoot& impulse, Eigen::Ref<Eigen::MatrixXd> X)
     : model_(model),
       prior_camera_(camera),
       prior_features_(features),
       covariance_(covariance),
       measurements_(std::move(measurements)),
-      calibration_share_(calibration_share),
+      noise_(noise),
       impulse_(impulse),
       X_(X),
       camera_(camera),
@@ -61,7 +64,7 @@ MeasurementUpdate::MeasurementUpdate(const CameraModel& model, const CameraState
   PL_.col(3).noalias() = covariance.view() * L_.col(3);
 }
 
-bool MeasurementUpdate::linearise() {
+bool RobustUpdate::linearise() {
   stack_.clear();
   const CameraModel lens = model_.corrected(camera_.lens);
   for (const UsableMeasurement& m : measurements_) {
@@ -72,7 +75,7 @@ bool MeasurementUpdate::linearise() {
   return true;
 }
 
-void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) {
+void RobustUpdate::addNoise(Eigen::MatrixXd& S) {
   second_order_.assign(measurements_.size(), Eigen::Matrix2d::Zero());
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     if (moments_[i](3, 3) > 0.0)
@@ -84,8 +87,7 @@ void MeasurementUpdate::addNoise(Eigen::MatrixXd& S) {
 
 /// What the impulse, which is anew in each image, makes of the measurements once the rest is known:
 /// K = (1 + B^T R^-1 B)^-1 B^T R^-1, for `B` = d(pixels) / d(impulse) and the noise R of one image.
-Eigen::Matrix<double, 6, Eigen::Dynamic> MeasurementUpdate::impulseGain(
-    const Eigen::MatrixXd& B) const {
+Eigen::Matrix<double, 6, Eigen::Dynamic> RobustUpdate::impulseGain(const Eigen::MatrixXd& B) const {
   Eigen::Matrix<double, 6, Eigen::Dynamic> weighted = B.transpose();
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     const Eigen::Matrix2d R =
@@ -97,50 +99,52 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> MeasurementUpdate::impulseGain(
   return information.llt().solve(weighted);
 }
 
-/// `weighted`: S^-1 y for the innovation y. Of what the others leave of y_i, the covariance is the
-/// inverse of that block of S^-1, and itself that times the block of S^-1 y. `variances_px2` are as
-/// expected, those of the measurements as found so far. Whether they, and S, have changed.
-bool MeasurementUpdate::weighTails(const Eigen::VectorXd& weighted,
-                                   const std::vector<double>& variances_px2, Eigen::MatrixXd& S) {
+/// `weighted`: S^-1 y for the innovation y. The leave-one-out residual e of measurement i is
+/// ([S^-1]_ii)^-1 [S^-1 y]_i, of covariance C = ([S^-1]_ii)^-1. `expected_px2`: R before tails,
+/// `applied` times the prior's. Whether R, and S, have changed.
+///
+/// Variance component estimation of the scale: with q = C^-1 e, R q^T q has the mean tr(R C^-1),
+/// twice the redundancy number; weighted, kTailSquare of it. C is with R before tails: else what
+/// the residual itself did to its weight would bias the scale by its redundancy.
+bool RobustUpdate::reweigh(const Eigen::VectorXd& weighted, const std::vector<double>& expected_px2,
+                           double applied, Eigen::MatrixXd& S) {
   const Eigen::MatrixXd inverse_root = inverseRoot(llt_);
-  bool any = false;
-  noise_left_.clear();
+  bool has_changed = false;
+  double squares = 0.0;
+  noise_degrees_ = 0.0;
+  redundancy_.clear();
   for (Eigen::Index i = 0; i < weighted.size() / 2; ++i) {
-    const Eigen::Matrix2d& shape = measurements_[i].shape;
+    UsableMeasurement& m = measurements_[i];
     const Eigen::Matrix2d left_out = inverseBlock(inverse_root, i).inverse();
-    const double expected_px2 = variances_px2[i], found_px2 = measurements_[i].variance_px2;
-    const Eigen::Matrix2d expected = left_out - (found_px2 - expected_px2) * shape;
-    const Eigen::Vector2d left = left_out * weighted.segment<2>(2 * i);
-    const double chi2 = left.dot(expected.inverse() * left);
-    const double factor = kTailVariance * (kTailDegrees + chi2) / (kTailDegrees + 2.0);
-    const double change_px2 = factor * expected_px2 - found_px2;
-    any |= std::abs(change_px2) > kTailTolerance * found_px2;
-    measurements_[i].variance_px2 += change_px2;
-    S.block<2, 2>(2 * i, 2 * i) += change_px2 * shape;
-    // What is left of an innovation y is R S^-1 y, of covariance R S^-1 R.
-    noise_left_.push_back(0.5 * measurements_[i].variance_px2 *
-                          (shape * (left_out + change_px2 * shape).inverse()).trace());
+    const Eigen::Matrix2d C = left_out - (m.variance_px2 - expected_px2[i]) * m.shape;
+    const Eigen::Matrix2d C_inverse = C.inverse();
+    const Eigen::Vector2d residual = left_out * weighted.segment<2>(2 * i);
+    const Eigen::Vector2d q = C_inverse * residual;
+    const double weight = (kTailDegrees + 2.0) / (kTailDegrees + residual.dot(q));
+    squares += weight * expected_px2[i] * q.dot(m.shape * q);
+    noise_degrees_ += expected_px2[i] * (m.shape * C_inverse).trace();
+
+    const double change_px2 = kTailVariance / weight * expected_px2[i] - m.variance_px2;
+    has_changed |= std::abs(change_px2) > kTailTolerance * m.variance_px2;
+    m.variance_px2 += change_px2;
+    S.block<2, 2>(2 * i, 2 * i) += change_px2 * m.shape;
+    // The post-fit residual of an innovation y is R S^-1 y, of covariance R S^-1 R.
+    redundancy_.push_back(0.5 * m.variance_px2 *
+                          (m.shape * (left_out + change_px2 * m.shape).inverse()).trace());
   }
-  return any;
+  noise_scale_ = applied * squares / (kTailSquare * noise_degrees_);
+  return has_changed;
 }
 
-/// An image whose matches disagree more than expected on the whole is noisier in all of them: the
-/// mean of what a prior as sure as so many degrees of freedom and the innovation's square leave of
-/// the scale (inverse gamma).
-void MeasurementUpdate::scaleNoise(Eigen::MatrixXd& S) {
-  const double degrees = 2.0 * static_cast<double>(measurements_.size());
-  const double scale =
-      (kDegreesLikeExpected + nis_ / kExpectedInnovation) / (kDegreesLikeExpected + degrees);
-  for (std::size_t i = 0; i < measurements_.size(); ++i) {
-    const double change_px2 = (scale - 1.0) * measurements_[i].variance_px2;
-    measurements_[i].variance_px2 += change_px2;
-    S.block<2, 2>(2 * i, 2 * i) += change_px2 * measurements_[i].shape;
-  }
+/// Posterior mean of the factor common to all R.
+double RobustUpdate::posteriorScale() const {
+  if (std::isinf(noise_.degrees)) return 1.0;
+  return (noise_.degrees + noise_degrees_ * noise_scale_) / (noise_.degrees + noise_degrees_);
 }
 
-/// How noisy each measurement is, by the first innovation and the S of the noise expected, which
-/// then is that of the noise found. False when S could not be factorised.
-bool MeasurementUpdate::judgeNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S) {
+/// R of each measurement, by the first innovation; S, which came with the prior's R, has it then.
+/// False when S could not be factorised.
+bool RobustUpdate::estimateNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S) {
   Eigen::VectorXd weighted;
   const auto weigh = [&] {
     llt_.compute(S);
@@ -150,25 +154,28 @@ bool MeasurementUpdate::judgeNoise(const Eigen::VectorXd& innovation, Eigen::Mat
   };
   if (!weigh()) return false;
   nis_ = innovation.dot(weighted);
-  scaleNoise(S);
-  if (!weigh()) return false;
-  std::vector<double> variances_px2;
-  for (const UsableMeasurement& m : measurements_) variances_px2.push_back(m.variance_px2);
+  std::vector<double> prior_px2;
+  for (const UsableMeasurement& m : measurements_) prior_px2.push_back(m.variance_px2);
+  std::vector<double> expected_px2(prior_px2.size());
+  const double least = std::min(1.0, noise_.minimum_px2 / medianOf(prior_px2));
+  double applied = 1.0;
   for (int round = 0; round < kMostTailRounds; ++round) {
-    const bool has_changed = weighTails(weighted, variances_px2, S);
+    for (std::size_t i = 0; i < expected_px2.size(); ++i) expected_px2[i] = applied * prior_px2[i];
+    const bool has_changed = reweigh(weighted, expected_px2, applied, S);
     if (!weigh()) return false;
-    if (!has_changed) break;
+    if (round > 0 && !has_changed) break;
+    applied = std::max(posteriorScale(), least);
   }
-  left_px_.clear();
+  residuals_px_.clear();
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     const UsableMeasurement& m = measurements_[i];
     const Eigen::Matrix2d root = m.shape.llt().matrixL();  // off which R S^-1 y is taken
-    left_px_.push_back(m.variance_px2 * (root.transpose() * weighted.segment<2>(2 * i)));
+    residuals_px_.push_back(m.variance_px2 * (root.transpose() * weighted.segment<2>(2 * i)));
   }
   return true;
 }
 
-bool MeasurementUpdate::step(bool first) {
+bool RobustUpdate::step(bool first) {
   stack_.crossCovariance(covariance_, X_);
   Eigen::VectorXd innovation = z_ - stack_.pixels();
   Eigen::MatrixXd S, B = stack_.cameraJacobian().leftCols<kMotion>() * impulse_;
@@ -184,22 +191,21 @@ bool MeasurementUpdate::step(bool first) {
     B.noalias() += HC * (L_.topRows<kMotion>().transpose() * impulse_);
   }
   addNoise(S);
-  if (first && !judgeNoise(innovation, S)) return false;
+  if (first && !estimateNoise(innovation, S)) return false;
   for (std::size_t i = 0; i < measurements_.size(); ++i)
-    S.block<2, 2>(2 * i, 2 * i) += measurements_[i].lasting_px2 * measurements_[i].shape;
+    S.block<2, 2>(2 * i, 2 * i) += measurements_[i].correlatedVariance() * measurements_[i].shape;
   llt_.compute(S);
   if (llt_.info() != Eigen::Success) return false;
   // With Q = G G^T the impulse's covariance and K its gain: what the rest leaves is fused by K. Put
-  // together, the motion's rows of P H^T grow by G K L, for the lasting noise L, and its covariance
-  // by G K L K^T G^T.
+  // together, the motion's rows of P H^T grow by G K L, for the noise L that R is inflated by, and
+  // its covariance by G K L K^T G^T.
   const Eigen::Matrix<double, kMotion, Eigen::Dynamic> GK = impulse_ * impulseGain(B);
   Eigen::Matrix<double, kMotion, Eigen::Dynamic> more = GK;
   for (std::size_t i = 0; i < measurements_.size(); ++i)
-    more.middleCols<2>(2 * i) *= measurements_[i].lasting_px2 * measurements_[i].shape;
+    more.middleCols<2>(2 * i) *= measurements_[i].correlatedVariance() * measurements_[i].shape;
   X_.topRows<kMotion>() += more;
   added_.noalias() = more * GK.transpose();
   delta_.noalias() = X_ * llt_.solve(innovation);
-  delta_.segment<CameraError::kCalibrationSize>(CameraError::kReadout) *= calibration_share_;
   if (!delta_.allFinite()) return false;
   camera_ = prior_camera_;
   features_ = prior_features_;
@@ -208,7 +214,7 @@ bool MeasurementUpdate::step(bool first) {
   return true;
 }
 
-bool MeasurementUpdate::isLinearEnough(const Eigen::VectorXd& expected) const {
+bool RobustUpdate::isLinearEnough(const Eigen::VectorXd& expected) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
     sum += (stack_.projection(i).pixel - expected.segment<2>(2 * i)).squaredNorm() /
@@ -217,7 +223,7 @@ bool MeasurementUpdate::isLinearEnough(const Eigen::VectorXd& expected) const {
   return sum < kNonlinearityTolerance * kNonlinearityTolerance * expected.size();
 }
 
-bool MeasurementUpdate::solve(int iterations) {
+bool RobustUpdate::solve(int iterations) {
   if (!linearise()) return false;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const Eigen::VectorXd last_delta = delta_;
@@ -229,7 +235,7 @@ bool MeasurementUpdate::solve(int iterations) {
   return true;
 }
 
-MotionCovariance MeasurementUpdate::finish() {
+MotionCovariance RobustUpdate::finish() {
   timesTransposeOf(inverseRoot(llt_), X_);
   return added_;
 }

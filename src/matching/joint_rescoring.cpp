@@ -12,22 +12,22 @@
 namespace active_matching_slam {
 namespace {
 
-/// A hypothesis is compared with the heaviest on so many features, those that were searched first,
-/// and on so many of those where the two contradict each other. All others have such small ellipses
-/// that who agrees on these agrees on them too.
+/// Cost: a hypothesis is compared with the heaviest on this many features, those searched first,
+/// and on this many of those where the two contradict each other. Ellipses of all later features
+/// are so small that hypotheses which agree on these agree on the rest too.
 constexpr std::size_t kCompared = 16, kContradicted = 8;
-/// Others are predicted from so many at most.
+/// Cost: most features that a prediction is conditioned on.
 constexpr std::size_t kMostKnown = 32;
-/// Features missed beyond what their rates explain that make one doubt.
-constexpr double kSurpriseSigmas = 3.0;
+/// Standard: missed detections beyond their expectation, in sigma of a sum of Bernoulli trials.
+constexpr double kMissedDetectionSigmas = 3.0;
 
-/// A Gaussian of image points of which one after the other becomes known.
+/// A joint Gaussian of image points, conditioned on one after the other (chain rule).
 class PredictionChain {
  public:
   explicit PredictionChain(const ProperPrior& prior)
       : prior_(prior), factor_(2 * kMostKnown, 2 * kMostKnown), whitened_(2 * kMostKnown) {}
 
-  /// Where the feature is expected, given those that are known.
+  /// Prediction of the feature, given those that are known.
   SearchEllipse predict(int feature) {
     const auto n = static_cast<Eigen::Index>(known_.size());
     cross_.resize(2 * n, 2);
@@ -39,8 +39,8 @@ class PredictionChain {
             prior_.covariance(feature) - cross_.transpose() * cross_};
   }
 
-  /// After predict() of the same feature. What comes after kMostKnown changes little.
-  void learn(int feature, const SearchEllipse& predicted, const Eigen::Vector2d& pixel) {
+  /// After predict() of the same feature. Beyond kMostKnown predictions hardly improve.
+  void condition(int feature, const SearchEllipse& predicted, const Eigen::Vector2d& pixel) {
     if (known_.size() >= kMostKnown) return;
     const auto n = 2 * static_cast<Eigen::Index>(known_.size());
     const Eigen::Matrix2d root = predicted.covariance.llt().matrixL();
@@ -60,12 +60,12 @@ class PredictionChain {
 
 }  // namespace
 
-bool Mixture::lags(const Hypothesis& h) const {
+bool Mixture::hasUnclaimedMatches(const Hypothesis& h) const {
   for (const int f : first_searched_) {
     if (h.isFused(f) || !(h.joint->marginal(f).determinant > 0.0)) continue;
-    for (const SearchMatch& m : ledger_.matches(f))
+    for (const SearchMatch& m : search_.matches(f))
       if (mahalanobisSquared(h.ellipse(f), m.pixel) <= kEllipseRadius2 &&
-          !liesInLineage(h, f, m.pixel))
+          !liesInAncestry(h, f, m.pixel))
         return true;
   }
   return false;
@@ -75,7 +75,7 @@ Mixture::Evidence Mixture::evidenceOf(const Hypothesis& h, const std::vector<int
   constexpr double kLeast = 1e-300;
   Evidence evidence;
   evidence.match = h.match;
-  evidence.log_claimed = h.log_merged;
+  evidence.log_likelihood = h.log_merged;
   PredictionChain chain(prior_);
   std::vector<int> open;
   for (const int f : features) {
@@ -86,58 +86,60 @@ Mixture::Evidence Mixture::evidenceOf(const Hypothesis& h, const std::vector<int
     }
     const SearchEllipse expected = chain.predict(f);
     if (!isProperEllipse(expected)) continue;
-    const Eigen::Vector2d& pixel = ledger_.matches(f)[slot(m)].pixel;
+    const Eigen::Vector2d& pixel = search_.matches(f)[slot(m)].pixel;
     const double p = massOfPixel(pixel, expected.center, expected.covariance);
-    evidence.log_claimed += std::log(std::max(likelihood(f).match * p, kLeast));
-    chain.learn(f, expected, pixel);
+    evidence.log_likelihood += std::log(std::max(likelihood(f).match * p, kLeast));
+    chain.condition(f, expected, pixel);
   }
-  evidence.log_any = evidence.log_claimed;
-  const auto view = [&](int f) { return viewOf(h, f, chain.predict(f)); };
-  // What others found is taken up if that is likelier than not.
+  evidence.log_evidence = evidence.log_likelihood;
+  const auto of = [&](int f) { return featureEvidence(h, f, chain.predict(f)); };
+  // A match that others found is claimed if that is likelier than not.
   for (const int f : open) {
-    if (ledger_.matches(f).empty()) continue;
-    const View seen = view(f);
-    if (seen.best < 0 || !(seen.of_best > 0.5 * seen.any)) continue;
-    evidence.log_any += std::log(seen.any);
-    evidence.log_claimed += std::log(seen.of_best);
-    evidence.match[slot(f)] = seen.best;
-    chain.learn(f, seen.expected, ledger_.matches(f)[slot(seen.best)].pixel);
+    if (search_.matches(f).empty()) continue;
+    const FeatureEvidence found = of(f);
+    if (found.best < 0 || !(found.best_likelihood > 0.5 * found.likelihood)) continue;
+    evidence.log_evidence += std::log(found.likelihood);
+    evidence.log_likelihood += std::log(found.best_likelihood);
+    evidence.match[slot(f)] = found.best;
+    chain.condition(f, found.predicted, search_.matches(f)[slot(found.best)].pixel);
   }
   for (const int f : open) {
     if (evidence.match[slot(f)] >= 0) continue;
-    const double any = std::log(view(f).any);
-    evidence.log_any += any;
-    evidence.log_claimed += any;
+    const double log_likelihood = std::log(of(f).likelihood);
+    evidence.log_evidence += log_likelihood;
+    evidence.log_likelihood += log_likelihood;
   }
   return evidence;
 }
 
-/// match * sum of p over what the hypothesis may claim + in * max(0, A - sum of p over all) + 1 - A
-Mixture::View Mixture::viewOf(const Hypothesis& h, int f, const SearchEllipse& expected) const {
+/// match * sum of p over the matches that the hypothesis may claim + in * max(0, A - sum of p over
+/// all) + 1 - A
+Mixture::FeatureEvidence Mixture::featureEvidence(const Hypothesis& h, int f,
+                                                  const SearchEllipse& predicted) const {
   constexpr double kLeast = 1e-9;
-  View seen;
-  seen.expected = expected;
-  if (!isProperEllipse(expected)) return seen;
-  const std::vector<SearchMatch>& known = ledger_.matches(f);
+  FeatureEvidence evidence;
+  evidence.predicted = predicted;
+  if (!isProperEllipse(predicted)) return evidence;
+  const std::vector<SearchMatch>& known = search_.matches(f);
   const SearchLikelihood& likelihood = this->likelihood(f);
   double all = 0.0, free = 0.0;
   for (int m = 0; m < static_cast<int>(known.size()); ++m) {
     const Eigen::Vector2d& pixel = known[slot(m)].pixel;
-    const double p = massOfPixel(pixel, expected.center, expected.covariance);
+    const double p = massOfPixel(pixel, predicted.center, predicted.covariance);
     all += p;
-    if (liesInLineage(h, f, pixel)) continue;
+    if (liesInAncestry(h, f, pixel)) continue;
     free += p;
-    if (likelihood.match * p <= seen.of_best ||
-        !(mahalanobisSquared(expected, pixel) <= kEllipseRadius2))
+    if (likelihood.match * p <= evidence.best_likelihood ||
+        !(mahalanobisSquared(predicted, pixel) <= kEllipseRadius2))
       continue;
-    seen.of_best = likelihood.match * p;
-    seen.best = m;
+    evidence.best_likelihood = likelihood.match * p;
+    evidence.best = m;
   }
-  const double searched =
-      std::min(1.0, massOnPixels(ledger_.searchedPixels(f), expected.center, expected.covariance));
+  const double searched = std::min(
+      1.0, massOnPixels(search_.searchedPixels(f), predicted.center, predicted.covariance));
   const double missed = likelihood.in * std::max(0.0, searched - all) + 1.0 - searched;
-  seen.any = std::max(likelihood.match * free + missed, kLeast);
-  return seen;
+  evidence.likelihood = std::max(likelihood.match * free + missed, kLeast);
+  return evidence;
 }
 
 /// Features, not among the first `skipped` searched, for which one accepts a match that the other
@@ -146,7 +148,7 @@ std::vector<int> Mixture::contradictions(const Hypothesis& a, const Hypothesis& 
                                          std::size_t skipped) const {
   const auto denies = [&](const Hypothesis& h, int f, int match) {
     return h.isFused(f) ? h.match[slot(f)] != match
-                        : liesInLineage(h, f, ledger_.matches(f)[slot(match)].pixel);
+                        : liesInAncestry(h, f, search_.matches(f)[slot(match)].pixel);
   };
   std::vector<int> features;
   for (std::size_t i = skipped; i < first_searched_.size(); ++i) {
@@ -159,9 +161,9 @@ std::vector<int> Mixture::contradictions(const Hypothesis& a, const Hypothesis& 
   return features;
 }
 
-std::vector<Explanation> Mixture::recount() const {
+std::vector<Explanation> Mixture::rescoreJointly() const {
   const Hypothesis& leader = hypotheses_[slot(heaviest())];
-  if (hypotheses_.size() + aside_.size() + ended_.size() == 1)
+  if (hypotheses_.size() + pruned_.size() + completed_.size() == 1)
     return {{&leader, leader.match, kept_}};
   const std::vector<int> first(first_searched_.begin(),
                                first_searched_.begin() + static_cast<std::ptrdiff_t>(std::min(
@@ -169,54 +171,56 @@ std::vector<Explanation> Mixture::recount() const {
   const Evidence of_leader = evidenceOf(leader, first);
   std::vector<Explanation> explanations;
   double sum = 0.0;
-  const auto judge = [&](const Hypothesis& h) {
+  const auto score = [&](const Hypothesis& h) {
     std::vector<int> compared = contradictions(leader, h, first.size());
     const bool on_first = compared.empty();
     compared.insert(compared.begin(), first.begin(), first.end());
     Evidence evidence = &h == &leader ? of_leader : evidenceOf(h, compared);
-    const double base = on_first ? of_leader.log_any : evidenceOf(leader, compared).log_any;
-    explanations.push_back({&h, std::move(evidence.match), std::exp(evidence.log_claimed - base)});
-    sum += std::exp(evidence.log_any - base);
+    const double base =
+        on_first ? of_leader.log_evidence : evidenceOf(leader, compared).log_evidence;
+    explanations.push_back(
+        {&h, std::move(evidence.match), std::exp(evidence.log_likelihood - base)});
+    sum += std::exp(evidence.log_evidence - base);
   };
-  for (const Hypothesis& h : hypotheses_) judge(h);
-  for (const Hypothesis& h : ended_) judge(h);
-  for (const Hypothesis& h : aside_) judge(h);
+  for (const Hypothesis& h : hypotheses_) score(h);
+  for (const Hypothesis& h : completed_) score(h);
+  for (const Hypothesis& h : pruned_) score(h);
   for (Explanation& e : explanations) e.probability *= kept_ / sum;
   std::stable_sort(
       explanations.begin(), explanations.end(),
       [](const Explanation& a, const Explanation& b) { return a.probability > b.probability; });
-  // One that has waited takes up what was found for the other features too.
+  // Of an alternative, the matches of the remaining features are completed too.
   Explanation& accepted = explanations.front();
   if (accepted.hypothesis != &leader && first_searched_.size() > first.size())
     accepted.match = evidenceOf(*accepted.hypothesis, first_searched_).match;
   return explanations;
 }
 
-bool Mixture::heaviestFallsShort() const {
+bool Mixture::heaviestMissesTooMany() const {
   const Hypothesis& h = hypotheses_[slot(heaviest())];
   double missed = 0.0, expected = 0.0, variance = 0.0;
   for (int f = 0; f < features(); ++f) {
-    if (h.lineage[slot(f)] < 0 && !h.isFused(f)) continue;  // never searched
+    if (h.ancestry[slot(f)] < 0 && !h.isFused(f)) continue;  // never searched
     const double found = likelihood(f).true_positive * kEllipseMass;
     missed += !h.isFused(f);
     expected += 1.0 - found;
     variance += found * (1.0 - found);
   }
-  return missed > expected + kSurpriseSigmas * std::sqrt(variance) + 1.0;
+  return missed > expected + kMissedDetectionSigmas * std::sqrt(variance) + 1.0;
 }
 
-bool Mixture::beginRunnerUp() {
+bool Mixture::beginAlternative() {
   const int first = heaviest();
   for (int k = 0; k < static_cast<int>(hypotheses_.size()); ++k) {
     Hypothesis& h = hypotheses_[slot(k)];
-    if (k != first) (h.hasOpenCandidate() ? aside_ : ended_).push_back(std::move(h));
+    if (k != first) (h.hasOpenCandidate() ? pruned_ : completed_).push_back(std::move(h));
   }
   Hypothesis done = std::move(hypotheses_[slot(first)]);
   hypotheses_.clear();
   const auto next = std::max_element(
-      aside_.begin(), aside_.end(),
+      pruned_.begin(), pruned_.end(),
       [](const Hypothesis& a, const Hypothesis& b) { return a.most_weight < b.most_weight; });
-  if (next == aside_.end() || next->most_weight < kRunnerUpWeight) {
+  if (next == pruned_.end() || next->most_weight < kAlternativeWeight) {
     hypotheses_.push_back(std::move(done));
     return false;
   }
@@ -225,8 +229,8 @@ bool Mixture::beginRunnerUp() {
   beginTerms(begun);
   begun.weight = 1.0;
   begun.log_weight = 0.0;
-  aside_.erase(next);
-  ended_.push_back(std::move(done));
+  pruned_.erase(next);
+  completed_.push_back(std::move(done));
   return true;
 }
 

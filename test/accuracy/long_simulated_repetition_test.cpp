@@ -5,6 +5,7 @@
 
 #include <cstdio>
 
+#include "accuracy/long_runs.h"
 #include "active_matching_slam/evaluation/trajectory_error.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
@@ -17,7 +18,7 @@ struct BoardRun {
   double error_of_path = 0.0;  ///< absolute trajectory error over the length of the path
 };
 
-BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool second_opinion) {
+BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool fallback_matchers) {
   SimulatorOptions simulation;
   simulation.scene = "checkerboard";
   simulation.width = 320;
@@ -27,7 +28,7 @@ BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool seco
   Simulator simulator(simulation);
   TrackerOptions options;
   options.matcher = matcher;
-  options.second_opinion = second_opinion;
+  options.fallback_matchers = fallback_matchers;
   Tracker tracker(simulator.camera(), options);
   Trajectory tracked, truth;
   BoardRun run;
@@ -44,14 +45,15 @@ BoardRun trackCheckerboard(const std::string& matcher, double rate_hz, bool seco
   const double path = measureExcursion(truth).path_length;
   run.error_of_path = alignment ? absoluteTrajectoryError(pairs, *alignment) / path : 1.0;
   std::printf("%s at %g Hz%s: %d of %d frames, error %.2f %% of the path\n", matcher.c_str(),
-              rate_hz, second_opinion ? ", with second opinions" : "", run.tracked, run.frames,
+              rate_hz, fallback_matchers ? ", with fallback matchers" : "", run.tracked, run.frames,
               100.0 * run.error_of_path);
   return run;
 }
 
-class SimulatedRepetition : public testing::TestWithParam<double> {};
+class LongSimulatedRepetition : public test::LongRuns,
+                                public testing::WithParamInterface<double> {};
 
-TEST_P(SimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
+TEST_P(LongSimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
   const BoardRun active = trackCheckerboard("active", GetParam(), true);
   EXPECT_EQ(active.tracked, active.frames);
   EXPECT_LT(active.error_of_path, 0.003);
@@ -60,7 +62,8 @@ TEST_P(SimulatedRepetition, ActiveMatchingKeepsTheCheckerboardAsWellAsJcbb) {
   EXPECT_LT(active.error_of_path, 1.5 * jcbb.error_of_path);
 }
 
-TEST_P(SimulatedRepetition, ActiveSearchAloneLosesItAndRansacAloneIsNoBetterThanActiveMatching) {
+TEST_P(LongSimulatedRepetition,
+       ActiveSearchAloneLosesItAndRansacAloneIsNoBetterThanActiveMatching) {
   const BoardRun active = trackCheckerboard("active", GetParam(), true);
   const BoardRun search = trackCheckerboard("active_search", GetParam(), false);
   EXPECT_LT(search.tracked, search.frames);
@@ -68,7 +71,7 @@ TEST_P(SimulatedRepetition, ActiveSearchAloneLosesItAndRansacAloneIsNoBetterThan
   EXPECT_TRUE(ransac.tracked < ransac.frames || ransac.error_of_path > 0.9 * active.error_of_path);
 }
 
-INSTANTIATE_TEST_SUITE_P(Hertz, SimulatedRepetition, testing::Values(10.0, 7.5));
+INSTANTIATE_TEST_SUITE_P(Hertz, LongSimulatedRepetition, testing::Values(10.0, 7.5));
 
 }  // namespace
 }  // namespace active_matching_slam

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/image/image_feature_search.h"
+#include "active_matching_slam/image/template.h"
+#include "active_matching_slam/map/feature_map.h"
+#include "active_matching_slam/matching/match_result.h"
+#include "active_matching_slam/matching/measurement_prior.h"
+
+namespace active_matching_slam {
+
+/// The frame in hand: made when the filter's state has been predicted to its stamp, passed from
+/// stage to stage, each of which adds what it finds out.
+struct FrameState {
+  explicit FrameState(const ImageOptions& options) : search(options) {}
+
+  // From the prediction.
+  cv::Mat image;
+  double interval_s = 0.0;              ///< since the filter's state before
+  double predicted_interval_s = 0.0;    ///< of that, what the motion was predicted over
+  int poor_frames = 0;                  ///< frames just before this one with too few matches
+  bool depths_vague = false;            ///< all features were seen from about one place so far
+  std::vector<VisibleFeature> visible;  ///< all that should be seen, ascending id
+
+  // Of each feature chosen to be measured, in the order of `prior`.
+  std::vector<VisibleFeature> candidates;
+  std::vector<Template> templates;
+  std::vector<double> match_probabilities;  ///< by the feature's recent record
+  /// Where it was in `reference_image`; empty where it was not in view.
+  std::vector<std::optional<Eigen::Vector2d>> reference_px;
+  MeasurementPrior prior;
+  /// The last image with enough matches, whose camera is known. Empty when there is none.
+  cv::Mat reference_image;
+
+  // From the matching.
+  ImageFeatureSearch search;  ///< the match indices of `matching` point into it
+  MatchResult matching;
+  /// Entries of `prior` whose accepted match passes the innovation gate, ascending.
+  std::vector<int> inliers;
+
+  // From the update.
+  std::vector<FeatureMeasurement> measurements;  ///< those of the inliers, as fused
+};
+
+}  // namespace active_matching_slam

@@ -1,0 +1,87 @@
+// The default configuration on the first images of recordings of real cameras. Errors are of the
+// poses as they were given out at the time, over every frame.
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "accuracy/long_runs.h"
+#include "accuracy/recorded_run.h"
+
+namespace active_matching_slam {
+namespace {
+
+using test::errorMm;
+using test::RecordedRun;
+using test::RecordedRunOptions;
+using test::trackRecording;
+
+constexpr int kFrames = 200;
+
+class RecordedBeginnings : public test::RecordedRuns {};
+
+TEST_F(RecordedBeginnings, AreTracked) {
+  RecordedRunOptions options;
+  options.maximum_frames = kFrames;
+  for (const auto& [name, limit_mm] :
+       {std::make_pair("davison_monoslam_desk", 15.0), std::make_pair("uzh_vamr_checkerboard", 4.0),
+        std::make_pair("sevenscenes_redkitchen", 65.0)}) {
+    const RecordedRun run = trackRecording(name, options);
+    EXPECT_EQ(run.framesTracked(), run.frames()) << name;
+    EXPECT_LE(errorMm(run), limit_mm) << name;
+  }
+}
+
+TEST_F(RecordedBeginnings, AreTrackedAtThreeTimesTheSpeed) {
+  RecordedRunOptions options;
+  options.maximum_frames = kFrames;
+  options.every = 3;
+  options.speed = 3.0;
+  const RecordedRun run = trackRecording("davison_monoslam_desk", options);
+  EXPECT_EQ(run.framesTracked(), run.frames());
+  EXPECT_LE(errorMm(run), 15.0);
+}
+
+TEST_F(RecordedBeginnings, AreTrackedToScaleWithATarget) {
+  RecordedRunOptions options;
+  options.maximum_frames = kFrames;
+  options.known_target = true;
+  const RecordedRun run = trackRecording("davison_monoslam_desk", options);
+  EXPECT_EQ(run.framesTracked(), run.frames());
+  EXPECT_LE(errorMm(run, AlignmentKind::kRigid), 20.0);
+}
+
+TEST_F(RecordedBeginnings, ActiveMatchingKeepsTheCheckerboardAtSevenAndAHalfHertz) {
+  RecordedRunOptions options;
+  options.maximum_frames = kFrames / 4;
+  options.every = 4;
+  options.tracker.matcher = "active";
+  const RecordedRun run = trackRecording("uzh_vamr_checkerboard", options);
+  EXPECT_EQ(run.framesTracked(), run.frames());
+  EXPECT_LE(errorMm(run), 6.0);
+}
+
+// The first images, of which the filter knows least, take the matchers longest.
+TEST_F(RecordedBeginnings, AStartInAHurryIsNoLostStart) {
+  const std::string folder = recordedDataFolder() + "/sevenscenes_redkitchen";
+  RecordedSequence sequence(folder);
+  TrackerOptions options;
+  double now_s = 0.0;
+  options.matching.clock_s = [&now_s] { return now_s += 2e-5; };  // for each look at it
+  options.matching.max_milliseconds = 5.0;
+  Tracker tracker(sequence.camera(), options);
+  int frames = 0, cut_short = 0;
+  sequence.forEachFrame([&](const cv::Mat& image, double stamp_s) {
+    const auto frame = tracker.track(image, stamp_s);
+    cut_short += frame->matching.statistics.cut_short;
+    if (frames > 0 && !frame->repeated_image) {
+      EXPECT_EQ(TrackingState::kTracking, frame->state) << frames;
+      EXPECT_GE(frame->matching.statistics.matched, 12) << frames;
+    }
+    return ++frames < 90;
+  });
+  EXPECT_GE(cut_short, 5);
+}
+
+}  // namespace
+}  // namespace active_matching_slam
