@@ -9,7 +9,7 @@
 namespace active_matching_slam {
 namespace {
 
-/// Features below which all take over the scale. Derivation: as many as hold a motion.
+/// Features below which all hold the scale. Derivation: as many as hold a motion.
 constexpr std::size_t kFewFeatures = 10;
 
 /// By which the median depth is what it is in the filter.

@@ -3,10 +3,11 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kMajority = 0.5;  ///< by definition: half of what should match
-/// Blur over one pixel halves the mean difference of neighbours; less is no blur to speak of.
+constexpr double kMajority = 0.5;  ///< Derivation: by definition, half of what should match
+/// Sharpness of the mean one below which an image is blurred. Derivation: averaging two neighbours
+/// leaves 2^(-1/2) of the mean difference of pixels whose differences are independent.
 constexpr double kSharp = 0.7;
-constexpr double kMemory = 0.1;  ///< weight of an image in the mean sharpness
+constexpr double kMemory = 0.1;  ///< Cost: weight of an image in the mean; of about ten
 
 }  // namespace
 
