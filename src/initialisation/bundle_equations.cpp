@@ -1,6 +1,5 @@
 #include "bundle_equations.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -9,9 +8,10 @@
 namespace active_matching_slam {
 namespace {
 
-/// Of every bearing [1/rad^2]: one that no image shows stays as it is.
-constexpr double kLeastInformation = 1e-2;
-constexpr double kLeastSigmaCalibration = 1e-8;  ///< of what is beyond doubt
+/// Information of every bearing [1/rad^2], so that one that no image shows stays; standard
+/// deviation of what is held; cost of an image point whose feature does not project. Derivation:
+/// negligible beside a pixel's, and beyond any residual's, in doubles.
+constexpr double kBearingInformation = 1e-2, kHeldSigma = 1e-8, kCostOfInvisible = 1e3;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -20,39 +20,65 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using CalibrationMatrix = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
 using CalibrationByPose = Eigen::Matrix<double, kCalibrationSize, 6>;
 
-/// An image point and what it tells, about the present state.
+/// An image point linearised about the present state.
 struct LinearPoint {
   Matrix26 d_pose;
   Matrix23 d_feature;
   Eigen::Vector2d residual_px;
-  double squared_px2 = 0.0;     ///< squaredMiss()
-  Eigen::Matrix2d information;  ///< [1/px^2]
-  double robust = 0.0;          ///< share of it that is left for what is off by so much
+  Eigen::Matrix2d information;  ///< times the loss's weight [1/px^2]
+  double cost = 0.0;
 };
+
+/// Cauchy's loss of a squared residual in sigmas.
+double robustCost(const BundleOptions& options, double squared_px2) {
+  const double limit = std::pow(options.loss_scale_sigmas, 2);
+  return limit * std::log1p(squared_px2 / (limit * options.sigma_px * options.sigma_px));
+}
 
 /// Empty when the feature does not project.
 std::optional<LinearPoint> linearPoint(const CameraModel& model, const BundleOptions& options,
-                                       const Bundle& bundle, std::size_t image,
+                                       const Bundle& bundle, const Eigen::Vector3d& position_world,
                                        const Eigen::Matrix3d& R_world_camera,
                                        const BundleObservation& o) {
   LinearPoint point;
-  const auto projection =
-      projectFromPose(model, bundle.cameras[image].position_world, R_world_camera,
-                      bundle.features[o.feature], &point.d_pose);
+  const auto projection = projectFromPose(model, position_world, R_world_camera,
+                                          bundle.features[o.feature], &point.d_pose);
   if (!projection) return std::nullopt;
   point.d_feature = projection->d_feature.leftCols<3>();
-  point.residual_px = plainPixel(bundle, o) - projection->pixel;
-  point.squared_px2 = squaredMiss(o, point.residual_px);
-  const double sigma_px = options.sigma_px * o.noise;
-  point.robust = 1.0 / (1.0 + point.squared_px2 / (options.outlier_px * options.outlier_px));
-  point.information = point.robust / (sigma_px * sigma_px) * o.inverse_shape;
+  point.residual_px = correctedPixel(bundle, o) - projection->pixel;
+  const double squared_px2 = whitenedSquare(o, point.residual_px);
+  const double sigma_px = options.sigma_px * o.relative_sigma;
+  const double limit_px = options.loss_scale_sigmas * options.sigma_px;
+  const double weight = 1.0 / (1.0 + squared_px2 / (limit_px * limit_px));
+  point.information = weight / (sigma_px * sigma_px) * o.inverse_shape;
+  point.cost = robustCost(options, squared_px2);
   return point;
+}
+
+void addPriors(const BundleOptions& options, const Bundle& bundle, NormalEquations* N) {
+  const CalibrationVector information = calibrationInformation(options);
+  const CalibrationVector gradient = information.cwiseProduct(bundle.calibration);
+  N->cameras.diagonal().tail<kCalibrationSize>() += information;
+  N->camera_gradient.tail<kCalibrationSize>() -= gradient;
+  N->cost += depthCost(options, bundle) + bundle.calibration.dot(gradient);
+  const double weight = 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
+  for (std::size_t i = 0; i < bundle.features.size(); ++i) {
+    N->features[i].diagonal() += Eigen::Vector3d(kBearingInformation, kBearingInformation, weight);
+    N->feature_gradient[3 * static_cast<Eigen::Index>(i) + 2] +=
+        weight * (options.inverse_depth - bundle.features[i].inverse_depth);
+  }
+  if (!options.rotation_only) return;
+  for (std::size_t k = 0; k + 1 < bundle.cameras.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(6 * k);
+    N->cameras.diagonal().segment<3>(row).array() += 1.0 / (kHeldSigma * kHeldSigma);
+    N->camera_gradient.segment<3>(row).setZero();
+  }
 }
 
 }  // namespace
 
 CalibrationVector calibrationInformation(const BundleOptions& options) {
-  return options.sigma_calibration.cwiseMax(kLeastSigmaCalibration).array().square().inverse();
+  return options.sigma_calibration.cwiseMax(kHeldSigma).array().square().inverse();
 }
 
 double depthCost(const BundleOptions& options, const Bundle& bundle) {
@@ -62,9 +88,14 @@ double depthCost(const BundleOptions& options, const Bundle& bundle) {
   return squares / (options.sigma_inverse_depth * options.sigma_inverse_depth);
 }
 
-double robustCost(const BundleOptions& options, double squared) {
-  const double limit = options.outlier_px * options.outlier_px;
-  return limit * std::log1p(squared / limit) / (options.sigma_px * options.sigma_px);
+double bundleCost(const CameraModel& model, const BundleOptions& options, const Bundle& bundle) {
+  double cost =
+      depthCost(options, bundle) +
+      bundle.calibration.dot(calibrationInformation(options).cwiseProduct(bundle.calibration));
+  forEachResidual(model, bundle, [&](std::size_t, const BundleObservation&, double squared_px2) {
+    cost += std::isfinite(squared_px2) ? robustCost(options, squared_px2) : kCostOfInvisible;
+  });
+  return cost;
 }
 
 NormalEquations linearise(const CameraModel& model, const BundleOptions& options,
@@ -75,35 +106,24 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
   const int C = 6 * K + kCalibrationSize;
   N.cameras = Eigen::MatrixXd::Zero(C, C);
   N.camera_gradient = Eigen::VectorXd::Zero(C);
-  N.features.assign(F, Eigen::Vector3d(kLeastInformation, kLeastInformation, 0.0).asDiagonal());
+  N.features.assign(F, Eigen::Matrix3d::Zero());
   N.feature_gradient = Eigen::VectorXd::Zero(3 * F);
   N.cross = Eigen::MatrixXd::Zero(C, 3 * F);
-  const CalibrationVector information = calibrationInformation(options);
-  const CalibrationVector pull = information.cwiseProduct(bundle.calibration);
-  N.cameras.diagonal().tail<kCalibrationSize>() = information;
-  N.camera_gradient.tail<kCalibrationSize>() = -pull;
-  N.cost += depthCost(options, bundle) + bundle.calibration.dot(pull);
-  for (int i = 0; i < F; ++i) {
-    const double weight = 1.0 / (options.sigma_inverse_depth * options.sigma_inverse_depth);
-    const double error = options.inverse_depth - bundle.features[i].inverse_depth;
-    N.features[i](2, 2) += weight;
-    N.feature_gradient[3 * i + 2] += weight * error;
-  }
   CalibrationMatrix calibration = CalibrationMatrix::Zero();
-  Eigen::Matrix<double, kCalibrationSize, Eigen::Dynamic> calibration_features;
-  calibration_features.setZero(kCalibrationSize, 3 * F);
+  auto calibration_features = N.cross.bottomRows<kCalibrationSize>();
   for (int k = 0; k <= K; ++k) {
     const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
     Matrix6 pose = Matrix6::Zero();
     CalibrationByPose calibration_pose = CalibrationByPose::Zero();
     Vector6 pose_gradient = Vector6::Zero();
     for (const BundleObservation& o : bundle.observations[k]) {
-      const auto point = linearPoint(model, options, bundle, k, R, o);
+      const auto point =
+          linearPoint(model, options, bundle, bundle.cameras[k].position_world, R, o);
       if (!point) {
         N.cost += kCostOfInvisible;
         continue;
       }
-      N.cost += robustCost(options, point->squared_px2);
+      N.cost += point->cost;
       const Eigen::Vector2d& residual = point->residual_px;
       const Matrix23 &J = point->d_feature, weighted_J = point->information * J;
       N.features[o.feature].noalias() += J.transpose() * weighted_J;
@@ -127,79 +147,26 @@ NormalEquations linearise(const CameraModel& model, const BundleOptions& options
     N.camera_gradient.segment<6>(row) = pose_gradient;
   }
   N.cameras.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += calibration;
-  N.cross.bottomRows<kCalibrationSize>() = calibration_features;
+  addPriors(options, bundle, &N);
   return N;
 }
 
-Eigen::VectorXd depthShares(const CameraModel& model, const BundleOptions& options,
-                            const Bundle& bundle) {
-  const NormalEquations N = linearise(model, options, bundle);
-  Eigen::VectorXd shares(bundle.features.size());
-  for (Eigen::Index i = 0; i < shares.size(); ++i) {
-    const double variance = N.features[i].inverse()(2, 2);
-    shares[i] = std::pow(bundle.features[i].inverse_depth, 2) / variance;
-  }
-  return shares / shares.sum();
-}
-
-FeaturePulls pullsOfFeatures(const CameraModel& model, const BundleOptions& options,
-                             const Bundle& bundle, const NormalEquations& N,
-                             const CameraEquations& reduced, const LastPoseMap& map) {
-  const int readout = 6 * (static_cast<int>(bundle.cameras.size()) - 1);
-  FeaturePulls pulls;
-  pulls.features.resize(bundle.features.size());
-  double weights = 0.0, slopes = 0.0, squares = 0.0;
-  // One less for each that is estimated.
-  double degrees = -6.0 * static_cast<double>(bundle.cameras.size() - 1) -
-                   3.0 * static_cast<double>(bundle.features.size());
-  for (std::size_t k = 0; k < bundle.cameras.size(); ++k) {
-    const Eigen::Matrix3d R = bundle.cameras[k].q_world_camera.toRotationMatrix();
-    for (const BundleObservation& o : bundle.observations[k]) {
-      const auto point = linearPoint(model, options, bundle, k, R, o);
-      if (!point) continue;
-      weights += point->robust;
-      slopes += point->robust * point->robust;
-      squares += point->residual_px.dot(point->information * point->residual_px);
-      degrees += 2.0;
-      Eigen::Matrix<double, kLastPoseSize, 2> J =
-          map.col(readout) * o.d_calibration.col(0).transpose();
-      if (k > 0) J += map.middleCols<6>(6 * static_cast<int>(k - 1)) * point->d_pose.transpose();
-      FeaturePull& pull = pulls.features[o.feature];
-      pull.gradient += J * (point->information * point->residual_px);
-      pull.information += J * point->information * J.transpose();
-    }
-  }
-  for (std::size_t i = 0; i < bundle.features.size(); ++i) {
-    const auto from = static_cast<Eigen::Index>(3 * i);
-    const Eigen::Matrix<double, kLastPoseSize, 3> J =
-        map * reduced.cross.block(0, from, map.cols(), 3);
-    FeaturePull& pull = pulls.features[i];
-    pull.gradient -= J * (reduced.inverse_roots[i] * N.feature_gradient.segment<3>(from));
-    pull.information -= J * J.transpose();
-  }
-  if (slopes > 0.0) pulls.yielding = weights / slopes;
-  if (degrees > 0.0) pulls.missed = squares / degrees;
-  return pulls;
-}
-
-/// With the diagonal grown by `damping`. Empty when not positive definite. Given
-/// `lens_information`, that is all that is known of the lens once the rest is eliminated.
-std::optional<CameraEquations> eliminateFeatures(const BundleMatrix& information, double damping,
-                                                 const LensVector* lens_information) {
-  CameraEquations reduced;
-  reduced.cross.resize(information.cross.rows(), information.cross.cols());
-  reduced.inverse_roots.reserve(information.features.size());
-  for (std::size_t i = 0; i < information.features.size(); ++i) {
-    Eigen::Matrix3d H = information.features[i];
+std::optional<ReducedEquations> eliminateFeatures(const NormalEquations& equations, double damping,
+                                                  const LensVector* lens_information) {
+  ReducedEquations reduced;
+  reduced.cross.resize(equations.cross.rows(), equations.cross.cols());
+  reduced.inverse_roots.reserve(equations.features.size());
+  for (std::size_t i = 0; i < equations.features.size(); ++i) {
+    Eigen::Matrix3d H = equations.features[i];
     H.diagonal() *= 1.0 + damping;
     const Eigen::LLT<Eigen::Matrix3d> root(H);
     if (root.info() != Eigen::Success) return std::nullopt;
     reduced.inverse_roots.push_back(root.matrixL().solve(Eigen::Matrix3d::Identity()));
     const auto column = static_cast<Eigen::Index>(3 * i);
     reduced.cross.middleCols<3>(column).noalias() =
-        information.cross.middleCols<3>(column).lazyProduct(reduced.inverse_roots[i].transpose());
+        equations.cross.middleCols<3>(column).lazyProduct(reduced.inverse_roots[i].transpose());
   }
-  Eigen::MatrixXd S = information.cameras;
+  Eigen::MatrixXd S = equations.cameras;
   S.diagonal() *= 1.0 + damping;
   S.selfadjointView<Eigen::Lower>().rankUpdate(reduced.cross, -1.0);
   if (lens_information != nullptr) {

@@ -34,7 +34,8 @@ void Tracker::Implementation::reset(const std::string& reason) {
   state_ = TrackingState::kWaiting;
   reason_ = reason;
   map_.clear();
-  start_adjustment_.end();
+  map_monitor_.reset();
+  initialiser_.end();
   structure_.clear();
   structure_snapshot_ = {};
   filter_.reset(CameraState(), MotionCovariance::Zero());
@@ -64,7 +65,7 @@ void Tracker::Implementation::setScale(double factor) {
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   filter_.rescale(factor);
   map_.rescale(factor);
-  start_adjustment_.rescale(factor);
+  initialiser_.rescale(factor);
   T_world_reference_.translation() *= factor;
   scale_source_ = ScaleSource::kService;
 }
@@ -107,8 +108,9 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   cascade_.match(options_.matching, options_.fallback_matchers, &current);
   frame->timings_ms.match = stage.lap();
   correct(&current, frame);
-  adjustStart(current, frame);
+  const bool is_restarted = initialise(current, frame);
   frame->timings_ms.update = stage.lap();
+  if (is_restarted || giveUpWrongMap(current, frame)) return current;
   updateTrackingState(current);
   maintainMap(image, frame);
   frame->timings_ms.map = stage.lap();

@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "active_matching_slam/information/map_structure.h"
-#include "active_matching_slam/initialisation/start_adjustment.h"
+#include "active_matching_slam/initialisation/initialiser.h"
 #include "active_matching_slam/map/feature_map.h"
+#include "active_matching_slam/map/map_monitor.h"
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/tracker/frame_state.h"
 #include "active_matching_slam/tracker/match_cascade.h"
@@ -49,7 +50,7 @@ class Tracker::Implementation {
   bool accept(const cv::Mat& image, double stamp_s, TrackedFrame* frame);
   void start(const cv::Mat& image, TrackedFrame* frame);
   bool startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame);
-  void adjustStart(const FrameState& current, TrackedFrame* frame);
+  bool initialise(const FrameState& current, TrackedFrame* frame);
   FrameState follow(const cv::Mat& image, double interval_s, TrackedFrame* frame);
   void predict(double interval_s);
   FrameState measure(const cv::Mat& image, double interval_s) const;
@@ -59,6 +60,7 @@ class Tracker::Implementation {
   static std::vector<FeatureMeasurement> selectMeasurements(const FrameState& current);
   void learnSlopes(const FrameState& current);
   void recordSearches(const FrameState& current, std::int64_t index);
+  bool giveUpWrongMap(const FrameState& current, TrackedFrame* frame);
   void updateTrackingState(const FrameState& current);
   void lose(const std::string& reason);
   void relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame);
@@ -82,8 +84,9 @@ class Tracker::Implementation {
   TrackerOptions options_;
   Ekf filter_;
   FrameNoise noise_;
-  StartAdjustment start_adjustment_;
+  Initialiser initialiser_;
   FeatureMap map_;
+  MapMonitor map_monitor_;
   MatchCascade cascade_;
   Relocaliser relocaliser_;
   MapStructure structure_;

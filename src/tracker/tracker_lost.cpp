@@ -1,6 +1,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "active_matching_slam/image/image_quality.h"
 #include "active_matching_slam/map/map_file.h"
 #include "tracker_implementation.h"
 
@@ -13,6 +14,22 @@ namespace {
 constexpr double kRelocalisedSigmaPosition = 0.2, kRelocalisedSigmaRotation = 0.1;
 
 }  // namespace
+
+/// Starts anew when the map has turned out wrong.
+bool Tracker::Implementation::giveUpWrongMap(const FrameState& current, TrackedFrame* frame) {
+  if (current.matching.statistics.cut_short) return false;  // not all was looked for
+  map_monitor_.add(last_stamp_s_, current.prior.size(),
+                   static_cast<int>(current.measurements.size()),
+                   measureImageQuality(current.image).sharpness);
+  if (!map_monitor_.isWrong()) return false;
+  const std::string reason =
+      "the map is wrong: half of what it predicts does not match in images as sharp as ever; "
+      "started anew";
+  reset(reason);
+  start(current.image, frame);
+  frame->reason = reason;
+  return true;
+}
 
 /// Decides whether the camera is still tracked.
 void Tracker::Implementation::updateTrackingState(const FrameState& current) {
@@ -40,7 +57,8 @@ void Tracker::Implementation::lose(const std::string& reason) {
   lost_stamp_s_ = last_stamp_s_;
   poor_frames_ = 0;
   ++times_lost_;
-  start_adjustment_.end();
+  map_monitor_.reset();
+  initialiser_.end();
   CameraState camera = filter_.camera();
   camera.velocity_world.setZero();
   camera.angular_velocity_camera.setZero();
@@ -87,7 +105,7 @@ bool Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* fra
   state_ = TrackingState::kTracking;
   reason_.clear();
   poor_frames_ = 0;
-  start_adjustment_.end();
+  initialiser_.end();
   return true;
 }
 
@@ -122,7 +140,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   map_.clear();
   for (const MapFeature& feature : content.map) map_.add(feature);
   scale_source_ = static_cast<ScaleSource>(content.scale_source);
-  start_adjustment_.end();
+  initialiser_.end();
   structure_.clear();
   structure_snapshot_ = {};
   state_ = TrackingState::kLost;

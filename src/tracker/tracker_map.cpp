@@ -119,6 +119,8 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
                                        point.w() * T_camera_world.translation());
     if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
   }
+  const auto& fixed = initialiser_.imageFixedPixels();
+  occupied.insert(occupied.end(), fixed.begin(), fixed.end());
   const std::vector<DepthSample> known_depths = knownDepths(visible);
   const double relative_sigma =
       options_.filter.initial_sigma_inverse_depth / options_.filter.initial_inverse_depth;
@@ -131,9 +133,9 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
     if (!patch) continue;
     const double inverse_depth = depthPrior(corner.pixel, known_depths);
     MapFeature feature;
-    feature.id = filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
-                                                relative_sigma * inverse_depth,
-                                                noise_.typicalSigma_px());
+    feature.id =
+        filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
+                                       relative_sigma * inverse_depth, noise_.typicalSigma_px());
     if (feature.id < 0) continue;
     first_sights.push_back({feature.id, corner.pixel, 0.0});
     feature.patch = std::move(*patch);
@@ -141,7 +143,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
     map_.add(std::move(feature));
     ++started;
   }
-  start_adjustment_.addFirstSights(first_sights);
+  initialiser_.addFirstSights(first_sights);
   return started;
 }
 

@@ -71,7 +71,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
   current.interval_s = interval_s;
   current.predicted_interval_s = std::min(interval_s, options_.max_frame_interval_s);
   current.poor_frames = poor_frames_;
-  current.depths_vague = start_adjustment_.areDepthsVague();
+  current.depths_vague = initialiser_.isFirstInSight();
   current.reference_image = reference_image_;
   chooseCandidates(&current);
   predictMeasurements(&current);
@@ -92,12 +92,12 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
 /// Updates the filter by the matches, and learns from them.
 void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) {
   current->measurements = selectMeasurements(*current);
-  noise_.weigh([this](FeatureId id) { return start_adjustment_.adjusts(id); }, map_,
+  noise_.weigh([this](FeatureId id) { return initialiser_.isAdjusting(id); }, map_,
                &current->measurements);
   frame->match_sigma_px = noise_.typicalSigma_px();
 
   // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
-  const bool are_depths_guessed = start_adjustment_.areDepthsGuessed();
+  const bool are_depths_guessed = initialiser_.areDepthsGuessed();
   const NoisePrior prior = are_depths_guessed ? NoisePrior() : noise_.prior();
   const UpdateReport report = filter_.update(camera_, current->measurements, prior);
   frame->nis = report.nis;

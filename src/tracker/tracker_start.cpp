@@ -22,6 +22,7 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
     return;
   }
   map_.clear();
+  map_monitor_.reset();
   if (!options_.known_points.empty()) {
     if (!startFromKnownPoints(image, frame)) return;
   } else {
@@ -37,14 +38,14 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
   // each detection finds one a cell.
   for (int started = 1; started > 0; frame->features_started += started)
     started = startFeatures(image, {}, options_.map.features_per_frame - map_.size(), frame);
-  start_adjustment_.end();
+  initialiser_.end();
   if (options_.known_points.empty()) {
     filter_.fixScale(Ekf::kFreeScaleSigma);
     std::vector<FeatureMeasurement> first;
     for (const FeatureState& feature : filter_.features())
       if (const auto projection = projectFeature(camera_, filter_.camera(), feature))
         first.push_back({feature.id, projection->pixel, 0.0});
-    start_adjustment_.begin(frame->index, first);
+    initialiser_.begin({frame->index, last_stamp_s_, first});
   }
   if (map_.size() < std::max(4, options_.minimum_matches)) {
     state_ = TrackingState::kInitialising;
@@ -56,27 +57,36 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
   poor_frames_ = 0;
 }
 
-/// Lets the first images, taken together, correct what the filter made of them one by one.
-void Tracker::Implementation::adjustStart(const FrameState& current, TrackedFrame* frame) {
-  if (!start_adjustment_.isActive()) return;
-  start_adjustment_.add(frame->index, current.interval_s, filter_, current.measurements);
-  const auto adjusted = start_adjustment_.adjust(camera_.corrected({}), filter_);
-  if (!adjusted) return;
+/// Lets the first images, taken together, correct what the filter made of them one by one. True
+/// when this image became the first instead.
+bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame* frame) {
+  if (initialiser_.isDone()) return false;
+  const CameraModel calibrated = camera_.corrected({});
+  initialiser_.add(calibrated, {frame->index, last_stamp_s_, current.measurements}, filter_);
+  if (initialiser_.isFirstUnrelated()) {
+    start(current.image, frame);
+    ++resets_;
+    frame->reason = "the first image has nothing to do with the second: started anew from it";
+    return true;
+  }
+  const auto initial = initialiser_.step(calibrated, filter_);
+  if (!initial) return false;
   std::vector<FeatureId> dropped;  // too few measurements to take part
-  auto kept = adjusted->features.begin();
+  auto kept = initial->features.begin();
   for (const MapFeature& feature : map_.features()) {
-    if (kept != adjusted->features.end() && kept->id == feature.id) {
+    if (kept != initial->features.end() && kept->id == feature.id) {
       ++kept;
     } else {
       dropped.push_back(feature.id);
     }
   }
   retire(dropped, frame);
-  map_.movePatches([&adjusted](std::int64_t image, const Eigen::Isometry3d& T_world_camera) {
-    return adjusted->corrected(image, T_world_camera);
+  map_.movePatches([&initial](std::int64_t image, const Eigen::Isometry3d& T_world_camera) {
+    return initial->corrected(image, T_world_camera);
   });
-  filter_.restore(adjusted->camera, adjusted->features, adjusted->covariance, filter_.nextId());
-  if (!adjusted->is_refinement) structure_.restartAverages();
+  filter_.restore(initial->camera, initial->features, initial->covariance, filter_.nextId());
+  if (initial->is_first) structure_.restartAverages();
+  return false;
 }
 
 bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame) {

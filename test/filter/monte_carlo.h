@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "active_matching_slam/filter/ekf.h"
-#include "active_matching_slam/initialisation/start_adjustment.h"
+#include "active_matching_slam/initialisation/initialiser.h"
 #include "filter/chi_square.h"
 #include "filter/example_filter.h"
 
@@ -74,7 +74,7 @@ class Simulation {
       measurements.push_back({feature.id, *pixel + noise(), options_.sigma_px});
     }
     const UpdateReport report = filter_.update(model_, measurements);
-    adjustStart(dt, measurements);
+    initialise(measurements);
     SimulatedFrame frame = judge();
     frame.measured = report.used;
     frame.nis = report.nis / std::max(1, 2 * report.used);
@@ -120,11 +120,10 @@ class Simulation {
     return sum;
   }
 
-  void adjustStart(double dt, const std::vector<FeatureMeasurement>& measurements) {
-    start_adjustment_.add(++frame_, dt, filter_, measurements);
-    const auto adjusted = start_adjustment_.adjust(model_, filter_);
-    if (adjusted)
-      filter_.restore(adjusted->camera, adjusted->features, adjusted->covariance, filter_.nextId());
+  void initialise(const std::vector<FeatureMeasurement>& measurements) {
+    initialiser_.add(model_, {++frame_, frame_ / options_.rate_hz, measurements}, filter_);
+    if (const auto state = initialiser_.step(model_, filter_))
+      filter_.restore(state->camera, state->features, state->covariance, filter_.nextId());
   }
 
   void setHandHeldTruth() {
@@ -238,7 +237,7 @@ class Simulation {
       for (const FeatureState& feature : filter_.features())
         first.push_back(
             {feature.id, projectFeature(model_, filter_.camera(), feature)->pixel, 0.0});
-      start_adjustment_.begin(0, first);
+      initialiser_.begin({0, 0.0, first});
     }
     // The unit of length is what makes the mean inverse depth of the first features the expected
     // one.
@@ -282,7 +281,7 @@ class Simulation {
   CameraModel model_;
   Random random_;
   Ekf filter_;
-  StartAdjustment start_adjustment_;
+  Initialiser initialiser_;
   CameraState truth_, origin_;
   double time_ = 0.0;
   int frame_ = 0;

@@ -6,10 +6,10 @@
 namespace active_matching_slam {
 
 /// A camera that goes right and a little forward, turning left, past points at inverse depths from
-/// 0.4 to 1.6, but for `share_far` of them, at 0.01: the true bundle, with what `sigma_px` of noise
-/// leaves of its image points.
+/// 0.4 to 1.6, but for `fraction_far` of them, at 0.01: the true bundle, with what `sigma_px` of
+/// noise leaves of its image points.
 inline Bundle exampleBundle(const CameraModel& model, int cameras, int features, double step_m,
-                            double sigma_px, unsigned seed, double share_far = 0.0) {
+                            double sigma_px, unsigned seed, double fraction_far = 0.0) {
   Random random(seed);
   Bundle bundle;
   for (int k = 0; k < cameras; ++k) {
@@ -26,7 +26,7 @@ inline Bundle exampleBundle(const CameraModel& model, int cameras, int features,
     feature.bearing_world = model.unproject(random.pixel())->normalized();
     feature.tangent_world = feature.bearing_world.cross(Eigen::Vector3d::UnitY()).normalized();
     feature.inverse_depth = random.uniform(0.4, 1.6);
-    if (i < share_far * features) feature.inverse_depth = 0.01;
+    if (i < fraction_far * features) feature.inverse_depth = 0.01;
     for (int k = 0; k < cameras; ++k) {
       const auto projection = projectFeature(model, bundle.cameras[k], feature);
       if (!projection || !model.isInImage(projection->pixel)) continue;
@@ -34,6 +34,27 @@ inline Bundle exampleBundle(const CameraModel& model, int cameras, int features,
       bundle.observations[k].push_back({i, projection->pixel + Eigen::Vector2d(du, dv)});
     }
     bundle.features.push_back(feature);
+  }
+  return bundle;
+}
+
+/// The same past a camera that goes straight forward, slightly unsteady: the epipole is in the
+/// image.
+inline Bundle forwardBundle(const CameraModel& model, int cameras, int features, double step_m,
+                            double sigma_px, unsigned seed) {
+  Bundle bundle = exampleBundle(model, cameras, features, 0.0, 0.0, seed);
+  Random random(seed);
+  for (int k = 0; k < cameras; ++k) {
+    CameraState& camera = bundle.cameras[k];
+    camera.position_world = k * step_m * Eigen::Vector3d::UnitZ();
+    if (k > 0) camera.q_world_camera = rotationFromVector(Eigen::Vector3d(0.002, 0.001, 0.0) * k);
+    bundle.observations[k].clear();
+    for (int i = 0; i < features; ++i) {
+      const auto projection = projectFeature(model, camera, bundle.features[i]);
+      const double du = random.normal(sigma_px), dv = random.normal(sigma_px);
+      if (projection && model.isInImage(projection->pixel))
+        bundle.observations[k].push_back({i, projection->pixel + Eigen::Vector2d(du, dv)});
+    }
   }
   return bundle;
 }

@@ -1,0 +1,26 @@
+#pragma once
+
+namespace active_matching_slam {
+
+/// Notices a map that is wrong: half of what should match does not, while the images have as much
+/// texture as ever, so that neither blur nor darkness is to blame. Such a map does not come right
+/// by itself, and its poses are not to be trusted.
+class MapMonitor {
+ public:
+  void reset() { *this = MapMonitor(); }
+  /// An image at `stamp_s`, in which `matched` of `predicted` features were matched; `sharpness` is
+  /// ImageQuality's.
+  void add(double stamp_s, int predicted, int matched, double sharpness);
+  /// So it has been for the time it takes to be sure.
+  bool isWrong() const { return is_wrong_; }
+
+  /// Cost: how long a wrong map is kept [s]; within a second, with the image that tells.
+  static constexpr double kPatienceS = 0.9;
+
+ private:
+  double sharpness_ = 0.0;  ///< of images in which most was matched, their mean over about ten
+  double bad_since_s_ = -1.0;
+  bool is_wrong_ = false;
+};
+
+}  // namespace active_matching_slam

@@ -1,0 +1,27 @@
+#include "active_matching_slam/map/map_monitor.h"
+
+namespace active_matching_slam {
+namespace {
+
+constexpr double kMajority = 0.5;  ///< Derivation: by definition, half of what should match
+/// Sharpness of the mean one below which an image is blurred. Derivation: averaging two neighbours
+/// leaves 2^(-1/2) of the mean difference of pixels whose differences are independent.
+constexpr double kSharp = 0.7;
+constexpr double kMemory = 0.1;  ///< Cost: weight of an image in the mean; of about ten
+
+}  // namespace
+
+void MapMonitor::add(double stamp_s, int predicted, int matched, double sharpness) {
+  const bool is_good = matched >= kMajority * predicted;
+  if (is_good) {
+    sharpness_ += (sharpness_ > 0.0 ? kMemory : 1.0) * (sharpness - sharpness_);
+    bad_since_s_ = -1.0;
+  } else if (sharpness < kSharp * sharpness_) {
+    bad_since_s_ = -1.0;  // nothing can be said
+  } else if (bad_since_s_ < 0.0) {
+    bad_since_s_ = stamp_s;
+  }
+  is_wrong_ = bad_since_s_ >= 0.0 && stamp_s - bad_since_s_ >= kPatienceS;
+}
+
+}  // namespace active_matching_slam

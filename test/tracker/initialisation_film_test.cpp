@@ -1,0 +1,143 @@
+// The first images as cameras deliver them: short rendered films with what spoils a start.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "tracker/simulated_frames.h"
+
+namespace active_matching_slam {
+namespace {
+
+/// The slow film's first seconds, each image changed.
+Film changedFilm(int count, const std::function<void(int, cv::Mat*)>& change) {
+  Film film = slowFilm();
+  film.frames.resize(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    cv::Mat& image = film.frames[i].image;
+    image = image.clone();
+    change(i, &image);
+  }
+  return film;
+}
+
+/// A camera that is tracked to the end on the path that it went.
+void expectTracked(const Film& film, const Frames& frames, int from) {
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    EXPECT_EQ(frames[i]->state, TrackingState::kTracking) << i << ": " << frames[i]->reason;
+  const PathFit fit = fitPath(film, Frames(frames.begin() + from, frames.end()), from);
+  EXPECT_LT(fit.rms_m, 2.0 * kShareOfPath * fit.path_m);
+}
+
+TEST(InitialisationFilms, TextThatIsBurntInIsNoPartOfTheScene) {
+  const Film film = changedFilm(120, [](int, cv::Mat* image) {
+    for (int line = 0; line < 3; ++line)
+      cv::putText(*image, "CAM 2  17:35:0" + std::to_string(line), {20, 30 + 90 * line},
+                  cv::FONT_HERSHEY_SIMPLEX, 0.8, cv::Scalar(255), 2);
+  });
+  Tracker tracker = slowTracker();
+  expectTracked(film, trackFrames(film, &tracker, 0, 120), 10);
+}
+
+TEST(InitialisationFilms, AFirstImageFromAnOldBufferIsDropped) {
+  SimulatorOptions other = filmOptions(0.1);
+  other.seed = 7;
+  other.scene = "walkway";
+  const cv::Mat old_image = makeFilm(other).frames.front().image;
+  const Film film = changedFilm(90, [&old_image](int i, cv::Mat* image) {
+    if (i == 0) *image = old_image.clone();
+  });
+  Tracker tracker = slowTracker();
+  const Frames frames = trackFrames(film, &tracker, 0, 90);
+  EXPECT_NE(frames[1]->reason.find("first image"), std::string::npos) << frames[1]->reason;
+  expectTracked(film, frames, 2);
+  // The second is the first of the map: its camera is the world's origin.
+  EXPECT_LT(frames[1]->camera.position_world.norm(), 1e-9);
+}
+
+TEST(InitialisationFilms, LightsThatFlickerDoNotKeepItFromStarting) {
+  const Film film = changedFilm(120, [](int i, cv::Mat* image) {
+    constexpr double kGains[] = {1.0, 0.75, 0.5, 0.75};  // 100 Hz lamps, sampled
+    image->convertTo(*image, CV_8U, kGains[i % 4]);
+  });
+  Tracker tracker = slowTracker();
+  expectTracked(film, trackFrames(film, &tracker, 0, 120), 10);
+}
+
+TEST(InitialisationFilms, ACameraThatGoesForwardStarts) {
+  SimulatorOptions options = filmOptions(4.0);
+  options.motion = "forward";
+  options.scene = "office";
+  const Film film = makeFilm(options);
+  Tracker tracker(film.camera);
+  const int count = static_cast<int>(film.frames.size());
+  expectTracked(film, trackFrames(film, &tracker, 0, count), 30);
+}
+
+TEST(InitialisationFilms, ACameraThatOnlyTurnsIsFollowedAndStaysWhereItIs) {
+  // A panorama: a window that moves over a large image, past any parallax.
+  SimulatorOptions options = filmOptions(0.1, {1280, 480});
+  options.distortion = "none";
+  const Film wide = makeFilm(options);
+  CameraCalibration calibration = makeSimulatedCalibration(320, 240, "none");
+  const double f = wide.camera.calibration().fx;
+  calibration.fx = calibration.fy = f;
+  Film film{CameraModel(calibration), {}};
+  for (int i = 0; i < 240; ++i) {
+    // Rays of a small camera turned by `angle` about the vertical, in the wide one.
+    const double angle = 0.35 * std::sin(2.0 * M_PI * i / 120.0);
+    const double c = std::cos(angle), s = std::sin(angle);
+    const cv::Matx33d R(c, 0, s, 0, 1, 0, -s, 0, c);
+    const auto& w = wide.camera.calibration();
+    const cv::Matx33d K_wide(w.fx, 0, w.cx, 0, w.fy, w.cy, 0, 0, 1);
+    const cv::Matx33d K(f, 0, calibration.cx, 0, f, calibration.cy, 0, 0, 1);
+    SimulatedFrame frame;
+    frame.index = i;
+    frame.stamp_s = 1.0 + i / 30.0;
+    frame.truth = wide.frames.front().truth;
+    cv::warpPerspective(wide.frames.front().image, frame.image, K_wide * R * K.inv(), {320, 240},
+                        cv::INTER_CUBIC | cv::WARP_INVERSE_MAP);
+    cv::Mat noise(frame.image.size(), CV_16S);
+    cv::RNG random(static_cast<std::uint64_t>(i));
+    random.fill(noise, cv::RNG::NORMAL, 0, 1.5);
+    cv::add(frame.image, noise, frame.image, cv::noArray(), CV_8U);
+    film.frames.push_back(frame);
+  }
+  Tracker tracker(film.camera);
+  const Frames frames = trackFrames(film, &tracker, 0, 240);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i]->state, TrackingState::kTracking) << i << ": " << frames[i]->reason;
+    const double angle = 0.35 * std::sin(2.0 * M_PI * static_cast<double>(i) / 120.0);
+    const Eigen::Quaterniond truth(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()));
+    EXPECT_LT(frames[i]->camera.q_world_camera.angularDistance(truth), 0.02) << i;
+  }
+}
+
+TEST(InitialisationFilms, AMapThatTurnsOutWrongIsGivenUpWithinASecond) {
+  // From the second second on most of each image is that of another camera in another place.
+  SimulatorOptions other_options = filmOptions(6.0);
+  other_options.seed = 7;
+  other_options.scene = "walkway";
+  other_options.motion = "sideways";
+  const Film other = makeFilm(other_options);
+  constexpr int kChange = 60;
+  const Film film = changedFilm(150, [&other](int i, cv::Mat* image) {
+    if (i < kChange) return;
+    const cv::Rect most(0, 0, 225, 240);
+    other.frames[i].image(most).copyTo((*image)(most));
+  });
+  Tracker tracker = slowTracker();
+  const Frames frames = trackFrames(film, &tracker, 0, 150);
+  const auto given_up =
+      std::find_if(frames.begin(), frames.end(), [](const auto& f) { return f->resets > 0; });
+  ASSERT_NE(given_up, frames.end());
+  EXPECT_LE(given_up - frames.begin(), kChange + 31);
+  EXPECT_NE((*given_up)->reason.find("map"), std::string::npos) << (*given_up)->reason;
+  EXPECT_EQ(frames.back()->state, TrackingState::kTracking) << frames.back()->reason;
+}
+
+}  // namespace
+}  // namespace active_matching_slam
