@@ -11,10 +11,9 @@ namespace active_matching_slam {
 namespace {
 
 using test::randomGraph;
-using Structure = test::GraphStructure;
 
 TEST(SubmapPartition, HasAsManySubmapsAsAskedForAndContainsTheLevels) {
-  const Structure s(randomGraph(40, 1));
+  const test::GraphStructure s(randomGraph(40, 1));
   for (int submaps = 1; submaps <= 40; ++submaps) {
     const SubmapPartition partition = partitionIntoSubmaps(s.graph, s.hierarchy, submaps);
     EXPECT_EQ(partition.submaps, submaps);
@@ -29,7 +28,7 @@ TEST(SubmapPartition, HasAsManySubmapsAsAskedForAndContainsTheLevels) {
 }
 
 TEST(SubmapPartition, ComesAsNearToTheNumberAsTheGraphAllows) {
-  const Structure s(randomGraph(30, 2, 0.05));
+  const test::GraphStructure s(randomGraph(30, 2, 0.05));
   const int parts = s.hierarchy.levels.back().submaps;
   ASSERT_GT(parts, 1);
   EXPECT_EQ(partitionIntoSubmaps(s.graph, s.hierarchy, 1).submaps, parts);
@@ -38,7 +37,7 @@ TEST(SubmapPartition, ComesAsNearToTheNumberAsTheGraphAllows) {
 
 TEST(SubmapPartition, PreservesTheFractionWithTheMostSubmaps) {
   for (unsigned seed = 0; seed < 6; ++seed) {
-    const Structure s(randomGraph(40, seed, seed % 2 ? 1.0 : 0.2));
+    const test::GraphStructure s(randomGraph(40, seed, seed % 2 ? 1.0 : 0.2));
     for (double fraction : {0.0, 0.3, 0.5, 0.7, 0.9, 1.0}) {
       const SubmapPartition partition = partitionPreserving(s.graph, s.hierarchy, fraction);
       EXPECT_GE(partition.preserved, fraction);
@@ -52,7 +51,7 @@ TEST(SubmapPartition, PreservesTheFractionWithTheMostSubmaps) {
 
 TEST(SubmapPartition, LimitsTheSizeAndNoTreeLinkCouldStillJoinTwoSubmaps) {
   for (unsigned seed = 0; seed < 6; ++seed) {
-    const Structure s(randomGraph(40, seed, seed % 2 ? 1.0 : 0.1));
+    const test::GraphStructure s(randomGraph(40, seed, seed % 2 ? 1.0 : 0.1));
     for (int limit : {1, 2, 3, 7, 20, 40, 100}) {
       const SubmapPartition partition = partitionLimitingSize(s.graph, s.hierarchy, limit);
       std::vector<int> size(partition.submaps, 0);
@@ -68,14 +67,14 @@ TEST(SubmapPartition, LimitsTheSizeAndNoTreeLinkCouldStillJoinTwoSubmaps) {
 }
 
 TEST(SubmapPartition, OfNothingIsNothing) {
-  const Structure s(randomGraph(0, 0));
+  const test::GraphStructure s(randomGraph(0, 0));
   EXPECT_EQ(partitionIntoSubmaps(s.graph, s.hierarchy, 3).submaps, 0);
   EXPECT_EQ(partitionPreserving(s.graph, s.hierarchy, 0.5).submaps, 0);
   EXPECT_EQ(partitionLimitingSize(s.graph, s.hierarchy, 3).submaps, 0);
 }
 
 TEST(SubmapPartition, SaysWhatIsWrong) {
-  const Structure s(randomGraph(4, 0)), other(randomGraph(5, 0));
+  const test::GraphStructure s(randomGraph(4, 0)), other(randomGraph(5, 0));
   EXPECT_THROW(partitionIntoSubmaps(s.graph, s.hierarchy, 0), std::invalid_argument);
   EXPECT_THROW(partitionPreserving(s.graph, s.hierarchy, 1.1), std::invalid_argument);
   EXPECT_THROW(partitionPreserving(s.graph, s.hierarchy, -0.1), std::invalid_argument);
