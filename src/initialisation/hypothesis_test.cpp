@@ -22,9 +22,9 @@ double imagePoints(const Bundle& bundle) {
 /// Whether the translation is more than what noise would gain by its parameters.
 bool isTranslationSignificant(const InitialiserOptions& options, const Bundle& bundle,
                               double cost_decrease) {
-  const auto parameters = 3 * (bundle.cameras.size() - 1) + bundle.features.size();
+  const std::size_t parameters = 3 * (bundle.cameras.size() - 1) + bundle.features.size();
   const double quantile =
-      chiSquareQuantile(static_cast<int>(parameters + 1) / 2, 1.0 - std::exp(-options.log_odds));
+      chiSquareQuantile(static_cast<double>(parameters), 1.0 - std::exp(-options.log_odds));
   return cost_decrease > options.correlation_inflation * quantile;
 }
 
