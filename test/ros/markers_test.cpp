@@ -8,8 +8,8 @@
 #include "active_matching_slam/ros/frame_conversions.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 #include "active_matching_slam/visualisation/link_view.h"
-#include "ros/point_feature.h"
 #include "ros/world_header.h"
+#include "support/point_feature.h"
 
 namespace active_matching_slam {
 namespace {

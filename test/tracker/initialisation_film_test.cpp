@@ -29,7 +29,7 @@ void expectTracked(const Film& film, const Frames& frames, int from) {
   for (std::size_t i = 0; i < frames.size(); ++i)
     EXPECT_EQ(frames[i]->state, TrackingState::kTracking) << i << ": " << frames[i]->reason;
   const PathFit fit = fitPath(film, Frames(frames.begin() + from, frames.end()), from);
-  EXPECT_LT(fit.rms_m, 2.0 * kShareOfPath * fit.path_m);
+  EXPECT_LT(fit.rms_m, 2.0 * kFractionOfPath * fit.path_m);
 }
 
 TEST(InitialisationFilms, TextThatIsBurntInIsNoPartOfTheScene) {
@@ -72,7 +72,7 @@ TEST(InitialisationFilms, ACameraThatGoesForwardStarts) {
   options.motion = "forward";
   options.scene = "office";
   const Film film = makeFilm(options);
-  Tracker tracker(film.camera);
+  Tracker tracker(film.camera, TrackerOptions());
   const int count = static_cast<int>(film.frames.size());
   expectTracked(film, trackFrames(film, &tracker, 0, count), 30);
 }
@@ -106,7 +106,7 @@ TEST(InitialisationFilms, ACameraThatOnlyTurnsIsFollowedAndStaysWhereItIs) {
     cv::add(frame.image, noise, frame.image, cv::noArray(), CV_8U);
     film.frames.push_back(frame);
   }
-  Tracker tracker(film.camera);
+  Tracker tracker(film.camera, TrackerOptions());
   const Frames frames = trackFrames(film, &tracker, 0, 240);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     EXPECT_EQ(frames[i]->state, TrackingState::kTracking) << i << ": " << frames[i]->reason;

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "active_matching_slam/ros/frame_conversions.h"
+#include "active_matching_slam/information/submap_color.h"
 #include "active_matching_slam/visualisation/debug_canvas.h"
-#include "ros/point_feature.h"
+#include "support/point_feature.h"
 
 namespace active_matching_slam {
 namespace {
@@ -72,10 +72,10 @@ TEST(DebugImage, ShowsLinksByBitsAndSubmapsInTheirColoursWhenAsked) {
   DrawOptions submaps = plain;
   submaps.submaps = true;
   image = drawDebugImage(frame, submaps, 1);
-  const std_msgs::ColorRGBA third = submapColor(3);
+  const Eigen::Vector3f third = submapRgb(3);
   const cv::Vec3b inside = middle(image, 0, 1), across = middle(image, 1, 2);
-  EXPECT_NEAR(255.0 * third.r, inside[2], 3.0);
-  EXPECT_NEAR(255.0 * third.b, inside[0], 3.0);
+  EXPECT_NEAR(255.0 * third[0], inside[2], 3.0);
+  EXPECT_NEAR(255.0 * third[2], inside[0], 3.0);
   EXPECT_GT(across[0], 0);
   EXPECT_EQ(across[0], across[2]) << "grey: joins two submaps";
   EXPECT_EQ(cv::Vec3b(0, 0, 0), middle(image, 0, 2)) << "not of the tree";
