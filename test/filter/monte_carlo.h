@@ -92,6 +92,15 @@ class Simulation {
     double amplitude, omega, phase;
   };
 
+  /// Errors here are independent from image to image: none of the covariance's inflation, and a
+  /// first commit when it would be with correlated ones.
+  static InitialiserOptions forWhiteErrors() {
+    InitialiserOptions options;
+    options.log_odds *= options.correlation_inflation;
+    options.correlation_inflation = 1.0;
+    return options;
+  }
+
   static FilterOptions matched(const SimulationOptions& options) {
     FilterOptions filter = options.filter;
     filter.sigma_px = options.sigma_px;
@@ -281,7 +290,7 @@ class Simulation {
   CameraModel model_;
   Random random_;
   Ekf filter_;
-  Initialiser initialiser_;
+  Initialiser initialiser_{forWhiteErrors()};
   CameraState truth_, origin_;
   double time_ = 0.0;
   int frame_ = 0;

@@ -150,14 +150,15 @@ TEST(Kidnapping, AMapThatCannotBeFoundAgainIsGivenUpAtOnce) {
   Film film = slowFilm();
   Tracker tracker(film.camera, {});
   const int allowed = tracker.options().lost_after_frames;
-  for (int i = 1; i <= allowed + 1; ++i) {  // dark, and none repeats the one before
+  constexpr int kFirst = 3;  // images that belong together, without depth yet
+  for (int i = kFirst; i <= kFirst + allowed; ++i) {  // dark, and none repeats the one before
     film.frames[i].image = cv::Mat(240, 320, CV_8UC1, cv::Scalar(0));
     film.frames[i].image.at<std::uint8_t>(100, 100 + i) = 10;
   }
-  const Frames frames = trackFrames(film, &tracker, 0, allowed + 12);
-  EXPECT_EQ(frames[allowed]->state, TrackingState::kLost) << "with a map of one image: no depth";
-  EXPECT_EQ(frames[allowed + 1]->resets, 1);
-  EXPECT_NE(frames[allowed + 1]->reason.find("depth"), std::string::npos);
+  const Frames frames = trackFrames(film, &tracker, 0, kFirst + allowed + 11);
+  EXPECT_EQ(frames[kFirst + allowed - 1]->state, TrackingState::kLost) << "no depth is known yet";
+  EXPECT_EQ(frames[kFirst + allowed]->resets, 1);
+  EXPECT_NE(frames[kFirst + allowed]->reason.find("depth"), std::string::npos);
   EXPECT_EQ(frames.back()->state, TrackingState::kTracking) << "in a new map";
 }
 

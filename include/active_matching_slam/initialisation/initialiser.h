@@ -27,7 +27,7 @@ struct InitialState {
   std::vector<Correction> corrections;  ///< ascending
   bool is_first = true;                 ///< until it, depths were a guess
 
-  /// Pose of a camera by the correction of the nearest keyframe.
+  /// Pose of a camera by the correction of the last keyframe up to its image.
   Eigen::Isometry3d corrected(std::int64_t image, const Eigen::Isometry3d& T_world_camera) const;
 };
 
