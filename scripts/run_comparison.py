@@ -22,9 +22,10 @@ class Failure(Exception):
 
 
 class Run:
-    """The results of one build on one case, of its first `frames` images where that is given."""
+    """The results of one build on one case, of its first `frames` images where that is given;
+    errors are those of the frames tracked, or of those of them in `among`."""
 
-    def __init__(self, folder, case, frames=None):
+    def __init__(self, folder, case, frames=None, among=None):
         with open(str(folder / 'statistics.csv'), newline='') as file:
             rows = list(csv.DictReader(file))[:frames]
         summary = json.loads((folder / 'summary.json').read_text())
@@ -39,7 +40,8 @@ class Run:
             if summary['excursion'] > 0:
                 self.closing = summary['displacement'] / summary['excursion']
             return
-        poses = np.load(str(folder / 'poses.npy'))[:len(self.tracked)]
+        asked = np.flatnonzero(np.isin(self.tracked, self.tracked if among is None else among))
+        poses = np.load(str(folder / 'poses.npy'))[asked]
         truth = np.loadtxt(str(case.truth), ndmin=2)
         mine, its = associate(poses[:, 0], truth[:, 0])
         if len(mine) < 3:
@@ -54,7 +56,7 @@ class Run:
         if case.is_film:
             path_m = np.sum(np.linalg.norm(np.diff(truth[:, 1:4], axis=0), axis=1))
             self.ate_of_path = self.ate_m / path_m if path_m > 0 else None
-            self.nees[self.tracked[mine]] = pose_nees(pose, covariance, true)
+            self.nees[self.tracked[asked[mine]]] = pose_nees(pose, covariance, true)
 
     def numbers(self):
         """For the CSV file."""
@@ -115,14 +117,18 @@ def table(rows):
     return lines
 
 
-def ratios_of(pairs, coarse=()):
-    """Geometric means of NEW / OLD over pairs of runs: ATE, e/sigma, ms median, ms 99 %."""
-    def ratio(value, kept=pairs):
-        both = [(value(old), value(new)) for _, old, new in kept]
-        return geometric_mean([b / a for a, b in both if a and b])
+def ratios_of(pairs):
+    """Geometric means of NEW / OLD: ATE, e/sigma, ms median, ms 99 %. Pairs: (row, run of OLD, run
+    of NEW); each row counts the same, however many runs it has."""
+    def ratio(value, without=()):
+        of_row = {}
+        for row, old, new in pairs:
+            a, b = value(old), value(new)
+            if a and b and row not in without:
+                of_row.setdefault(row, []).append(b / a)
+        return geometric_mean([geometric_mean(ratios) for ratios in of_row.values()])
 
-    honest = [pair for pair in pairs if pair[0] not in coarse]
-    return [ratio(lambda run: run.ate_m), ratio(lambda run: quantile(run.ratios, .5), honest),
+    return [ratio(lambda run: run.ate_m), ratio(lambda run: quantile(run.ratios, .5), COARSE_TRUTH),
             ratio(lambda run: quantile(run.ms, .5)), ratio(lambda run: quantile(run.ms, .99))]
 
 
@@ -151,11 +157,12 @@ def report(results, builds, every=1):
             runs = [Run(folder, case, frames) for folder in outcomes]
             old.append(runs[0])
             new.append(runs[1])
-            if not frames:
-                missing = len(set(runs[0].tracked) - set(runs[1].tracked))
-                untracked += ['%s: %d' % (case.name, missing)] if missing else []
-        if not failed:
-            counted.append((case.row, case.is_film, *runs))
+            common = np.intersect1d(runs[0].tracked, runs[1].tracked)
+            missing = len(runs[0].tracked) - len(common)
+            if missing and not frames:
+                untracked.append('%s: %d' % (case.name, missing))
+        if not failed:  # errors grow with the way, so they are compared over the same frames
+            counted.append((case, *[Run(folder, case, frames, common) for folder in outcomes]))
     lines = table([(name, old, new) for name, (old, new) in rows.items()])
     films = max((len(old) for name, (old, _) in rows.items() if name.startswith('film ')),
                 default=0)
@@ -165,10 +172,10 @@ def report(results, builds, every=1):
     lines += ['', '| geometric means of NEW / OLD | ATE | e/sigma | ms | ms 99 % |',
               '|---|---|---|---|---|']
     for name, kept in (('recordings', [False]), ('films', [True]), ('all', [False, True])):
-        pairs = [(row, old, new) for row, is_film, old, new in counted if is_film in kept]
+        pairs = [(case.row, old, new) for case, old, new in counted if case.is_film in kept]
         if pairs:
             lines.append('| %s | ' % name + ' | '.join(
-                '' if np.isnan(r) else '%.3f' % r for r in ratios_of(pairs, COARSE_TRUTH)) + ' |')
+                '' if np.isnan(r) else '%.3f' % r for r in ratios_of(pairs)) + ' |')
     lines += ['', 'Frames that OLD tracked and NEW did not: %s.' %
               (', '.join(untracked) if untracked else 'none')]
     return lines + ([''] + failures if failures else []), not failures
