@@ -13,6 +13,8 @@ constexpr double kMemory = 0.1;  ///< Cost: weight of an image in the mean; of a
 
 void MapMonitor::add(double stamp_s, int predicted, int matched, double sharpness) {
   const bool is_good = matched >= kMajority * predicted;
+  if (is_good && last_stamp_s_ >= 0.0) right_s_ += stamp_s - last_stamp_s_;
+  last_stamp_s_ = stamp_s;
   if (is_good) {
     sharpness_ += (sharpness_ > 0.0 ? kMemory : 1.0) * (sharpness - sharpness_);
     bad_since_s_ = -1.0;
@@ -22,6 +24,11 @@ void MapMonitor::add(double stamp_s, int predicted, int matched, double sharpnes
     bad_since_s_ = stamp_s;
   }
   is_wrong_ = bad_since_s_ >= 0.0 && stamp_s - bad_since_s_ >= kPatienceS;
+}
+
+void MapMonitor::interrupt() {
+  bad_since_s_ = last_stamp_s_ = -1.0;
+  is_wrong_ = false;
 }
 
 }  // namespace active_matching_slam

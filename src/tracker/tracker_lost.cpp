@@ -15,13 +15,18 @@ constexpr double kRelocalisedSigmaPosition = 0.2, kRelocalisedSigmaRotation = 0.
 
 }  // namespace
 
-/// Starts anew when the map has turned out wrong.
+/// Starts anew when the map has turned out wrong. One that was right before is kept, and the camera
+/// looked for in it.
 bool Tracker::Implementation::giveUpWrongMap(const FrameState& current, TrackedFrame* frame) {
   if (current.matching.statistics.cut_short) return false;  // not all was looked for
   map_monitor_.add(last_stamp_s_, current.prior.size(),
                    static_cast<int>(current.measurements.size()),
                    measureImageQuality(current.image).sharpness);
   if (!map_monitor_.isWrong()) return false;
+  if (map_monitor_.hasBeenRight()) {
+    lose("half of what the map predicts does not match in images as sharp as ever");
+    return true;
+  }
   const std::string reason =
       "the map is wrong: half of what it predicts does not match in images as sharp as ever; "
       "started anew";
@@ -57,7 +62,7 @@ void Tracker::Implementation::lose(const std::string& reason) {
   lost_stamp_s_ = last_stamp_s_;
   poor_frames_ = 0;
   ++times_lost_;
-  map_monitor_.reset();
+  map_monitor_.interrupt();
   initialiser_.end();
   CameraState camera = filter_.camera();
   camera.velocity_world.setZero();

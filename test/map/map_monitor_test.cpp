@@ -46,5 +46,18 @@ TEST(MapMonitor, AHandThatCrossesTheViewIsNotHeldAgainstTheMap) {
   EXPECT_FALSE(watch.isWrongWithin(0.5, 20, kSharpness));
 }
 
+TEST(MapMonitor, AMapThatHasBeenRightIsToldFromOneThatNeverWas) {
+  Watch proven, never;
+  proven.isWrongWithin(3.0, 50, kSharpness);
+  never.isWrongWithin(0.2, 50, kSharpness);
+  ASSERT_TRUE(proven.isWrongWithin(1.0, 20, kSharpness));
+  ASSERT_TRUE(never.isWrongWithin(1.0, 20, kSharpness));
+  EXPECT_TRUE(proven.monitor.hasBeenRight());
+  EXPECT_FALSE(never.monitor.hasBeenRight());
+  proven.monitor.interrupt();
+  EXPECT_FALSE(proven.monitor.isWrong());
+  EXPECT_TRUE(proven.monitor.hasBeenRight()) << "lost and found again, it is the same map";
+}
+
 }  // namespace
 }  // namespace active_matching_slam

@@ -11,8 +11,12 @@ class MapMonitor {
   /// An image at `stamp_s`, in which `matched` of `predicted` features were matched; `sharpness` is
   /// ImageQuality's.
   void add(double stamp_s, int predicted, int matched, double sharpness);
+  /// The camera is lost: images after this do not go on from those before.
+  void interrupt();
   /// So it has been for the time it takes to be sure.
   bool isWrong() const { return is_wrong_; }
+  /// It has been right for as long at least: then it is the camera that is elsewhere.
+  bool hasBeenRight() const { return right_s_ >= kPatienceS; }
 
   /// Cost: how long a wrong map is kept [s]; within a second, with the image that tells.
   static constexpr double kPatienceS = 0.9;
@@ -20,6 +24,7 @@ class MapMonitor {
  private:
   double sharpness_ = 0.0;  ///< of images in which most was matched, their mean over about ten
   double bad_since_s_ = -1.0;
+  double right_s_ = 0.0, last_stamp_s_ = -1.0;  ///< time with most matched; of the last image
   bool is_wrong_ = false;
 };
 
