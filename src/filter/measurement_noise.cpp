@@ -58,7 +58,8 @@ double MeasurementNoise::inflation(const FitPrecision& fit, const LandmarkNoise&
 
 double MeasurementNoise::gateSigma_px() const {
   if (!has_learnt_) return options_.sigma_px;
-  return std::sqrt(std::pow(typicalSigma_px(), 2) + kPixelVariance);
+  // Wrong matches would widen the gates that let them in.
+  return std::sqrt(std::pow(std::min(typicalSigma_px(), options_.sigma_px), 2) + kPixelVariance);
 }
 
 double MeasurementNoise::degrees() const { return scale_.degrees(); }

@@ -71,7 +71,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
   current.interval_s = interval_s;
   current.predicted_interval_s = std::min(interval_s, options_.max_frame_interval_s);
   current.poor_frames = poor_frames_;
-  current.depths_vague = initialiser_.isFirstInSight();
+  current.depths_vague = initialiser_.areDepthsGuessed();
   current.reference_image = reference_image_;
   chooseCandidates(&current);
   predictMeasurements(&current);

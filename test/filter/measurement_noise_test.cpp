@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -63,7 +64,9 @@ TEST(MeasurementNoise, ConvergesToTheVarianceOfTheResiduals) {
     MeasurementNoise noise{FilterOptions()};
     learnImages(sigma_px * sigma_px, 60, &noise);
     EXPECT_NEAR(noise.typicalSigma_px(), sigma_px, 0.02 * sigma_px);
-    EXPECT_GT(noise.gateSigma_px(), sigma_px) << "whole pixels are searched";
+    const double bounded_px = std::min(sigma_px, FilterOptions().sigma_px);
+    EXPECT_GT(noise.gateSigma_px(), bounded_px) << "whole pixels are searched";
+    EXPECT_LT(noise.gateSigma_px(), bounded_px + 0.3) << "wrong matches do not widen gates";
     // By the fit of each match, to the first power.
     EXPECT_NEAR(noise.sigma_px({0.6}, LandmarkNoise()), 3.0 * sigma_px, 0.06 * sigma_px);
   }

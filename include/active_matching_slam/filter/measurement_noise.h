@@ -95,7 +95,8 @@ class MeasurementNoise {
   double inflation(const FitPrecision& fit, const LandmarkNoise& landmark) const;
   /// Of a typical match, at least 1.
   double inflation() const { return std::max(1.0, inflation_.scale()); }
-  /// Standard deviation per axis [px] that a match to be searched for is predicted with.
+  /// Standard deviation per axis [px] that a match to be searched for is predicted with: at most
+  /// FilterOptions::sigma_px of it is noise.
   double gateSigma_px() const;
 
   /// The same with a variance factor of 1 and without the lower bound.
