@@ -46,6 +46,7 @@ void checkFilterOptions(const FilterOptions& options) {
   checkPositive("sigma_px", options.sigma_px);
   checkPositive("minimum_sigma_px", options.minimum_sigma_px);
   checkPositive("noise_memory_s", options.noise_memory_s);
+  checkPositive("motion_memory_s", options.motion_memory_s);
   checkNotNegative("landmark_noise_px", options.landmark_noise_px);
   checkNotNegative("initial_sigma_velocity_mps", options.initial_sigma_velocity_mps);
   checkNotNegative("initial_sigma_angular_velocity_rps",

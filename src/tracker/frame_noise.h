@@ -9,8 +9,8 @@
 
 namespace active_matching_slam {
 
-/// Noise of the tracker's landmarks and matches: process noise of the former, R of the latter, which
-/// is learnt from the updates' residuals (MeasurementNoise).
+/// Noise of the tracker's landmarks and matches: process noise of the former, R of the latter,
+/// which is learnt from the updates' residuals (MeasurementNoise).
 class FrameNoise {
  public:
   explicit FrameNoise(const FilterOptions& options) : options_(options), noise_(options) {}

@@ -40,6 +40,7 @@ void Tracker::Implementation::reset(const std::string& reason) {
   structure_snapshot_ = {};
   filter_.reset(CameraState(), MotionCovariance::Zero());
   noise_.reset();
+  motion_noise_.reset();
   scale_source_ = ScaleSource::kFree;
   previous_image_.release();
   poor_frames_ = 0;
@@ -56,6 +57,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
   cascade_.setMatcher(options.matcher);
   filter_.setOptions(withTrustIn(camera_.calibration(), options.filter));
   noise_.setOptions(options.filter);
+  motion_noise_.setOptions(options.filter);
   relocaliser_ = Relocaliser({}, options.map, options.image);
   options_ = options;
 }
@@ -64,6 +66,7 @@ void Tracker::Implementation::setScale(double factor) {
   if (!(factor > 0.0) || !std::isfinite(factor))
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   filter_.rescale(factor);
+  motion_noise_.rescale(factor);
   map_.rescale(factor);
   initialiser_.rescale(factor);
   T_world_reference_.translation() *= factor;

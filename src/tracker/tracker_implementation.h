@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "active_matching_slam/filter/motion_noise.h"
 #include "active_matching_slam/information/map_structure.h"
 #include "active_matching_slam/initialisation/initialiser.h"
 #include "active_matching_slam/map/feature_map.h"
@@ -32,6 +33,7 @@ class Tracker::Implementation {
         options_(options),
         filter_(withTrustIn(camera.calibration(), options.filter)),
         noise_(options.filter),
+        motion_noise_(options.filter),
         cascade_(options.matcher),
         relocaliser_({}, options.map, options.image) {
     checkTrackerOptions(options);
@@ -84,6 +86,7 @@ class Tracker::Implementation {
   TrackerOptions options_;
   Ekf filter_;
   FrameNoise noise_;
+  MotionNoise motion_noise_;
   Initialiser initialiser_;
   FeatureMap map_;
   MapMonitor map_monitor_;

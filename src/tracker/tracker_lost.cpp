@@ -15,18 +15,14 @@ constexpr double kRelocalisedSigmaPosition = 0.2, kRelocalisedSigmaRotation = 0.
 
 }  // namespace
 
-/// Starts anew when the map has turned out wrong. One that was right before is kept, and the camera
-/// looked for in it.
+/// Starts anew when the map has turned out wrong. One that was right before is kept: there, few
+/// matches mean that the scene, or the view of it, has changed.
 bool Tracker::Implementation::giveUpWrongMap(const FrameState& current, TrackedFrame* frame) {
   if (current.matching.statistics.cut_short) return false;  // not all was looked for
   map_monitor_.add(last_stamp_s_, current.prior.size(),
                    static_cast<int>(current.measurements.size()),
                    measureImageQuality(current.image).sharpness);
-  if (!map_monitor_.isWrong()) return false;
-  if (map_monitor_.hasBeenRight()) {
-    lose("half of what the map predicts does not match in images as sharp as ever");
-    return true;
-  }
+  if (!map_monitor_.isWrong() || map_monitor_.hasBeenRight()) return false;
   const std::string reason =
       "the map is wrong: half of what it predicts does not match in images as sharp as ever; "
       "started anew";

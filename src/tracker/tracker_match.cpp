@@ -19,9 +19,10 @@ void Tracker::Implementation::predict(double interval_s) {
     T_world_reference_ = filter_.camera().poseWorldCamera();
   } else {
     filter_.decayVelocity(kVelocityDecay);
+    motion_noise_.reset();
   }
   interval_s = std::min(interval_s, options_.max_frame_interval_s);
-  filter_.predict(interval_s);
+  filter_.predict(interval_s, motion_noise_.expected());
   noise_.predict(camera_, interval_s, &filter_);
 }
 
@@ -54,6 +55,10 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   prior.z = std::move(predicted.z);
   prior.S = std::move(predicted.S);
   prior.noise_variance_px2 = sigma_px * sigma_px;
+  const Eigen::Matrix<double, 6, 1> jerk =
+      impulseVariance(motion_noise_.widest(), current->predicted_interval_s) -
+      impulseVariance(motion_noise_.expected(), current->predicted_interval_s);
+  current->jerk_px = predicted.impulse_px * jerk.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {
     if (ids[i] != prior.ids[kept]) continue;
@@ -96,6 +101,11 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
                &current->measurements);
   frame->match_sigma_px = noise_.typicalSigma_px();
 
+  Accelerations allowed = motion_noise_.expected();
+  if (current->is_jerk) {
+    allowed = motion_noise_.widest();
+    filter_.replaceAccelerations(allowed);
+  }
   // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
   const bool are_depths_guessed = initialiser_.areDepthsGuessed();
   const NoisePrior prior = are_depths_guessed ? NoisePrior() : noise_.prior();
@@ -103,6 +113,7 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 
+  if (!are_depths_guessed) motion_noise_.learn(report, allowed, current->predicted_interval_s);
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
   learnSlopes(*current);
   recordSearches(*current, frame->index);

@@ -33,6 +33,7 @@ const DoubleOption kOptions[] = {
     {"sigma_px", &FilterOptions::sigma_px, false},
     {"minimum_sigma_px", &FilterOptions::minimum_sigma_px, false},
     {"noise_memory_s", &FilterOptions::noise_memory_s, false},
+    {"motion_memory_s", &FilterOptions::motion_memory_s, false},
     {"landmark_noise_px", &FilterOptions::landmark_noise_px, true},
     {"initial_sigma_velocity_mps", &FilterOptions::initial_sigma_velocity_mps, true},
     {"initial_sigma_angular_velocity_rps", &FilterOptions::initial_sigma_angular_velocity_rps,

@@ -58,10 +58,10 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.reset_when_lost_after_s, 0.0, 1e6);
 
   visit(F{"filter/sigma_acceleration_mps2",
-          "linear acceleration, standard deviation per axis [m/s^2]", true},
+          "widest linear acceleration expected, standard deviation per axis [m/s^2]", true},
         o.filter.sigma_acceleration_mps2, 1e-3, 1e3);
   visit(F{"filter/sigma_angular_acceleration_rps2",
-          "angular acceleration, standard deviation per axis [rad/s^2]", true},
+          "widest angular acceleration expected, standard deviation per axis [rad/s^2]", true},
         o.filter.sigma_angular_acceleration_rps2, 1e-3, 1e3);
   visit(F{"filter/sigma_px",
           "noise of a match before any is learnt, and where its template's fit does not converge, "
@@ -73,6 +73,9 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.filter.minimum_sigma_px, 0.01, 20.0);
   visit(F{"filter/noise_memory_s", "time within which the noise of matches may change [s]", true},
         o.filter.noise_memory_s, 1e-3, 1e3);
+  visit(F{"filter/motion_memory_s", "time within which the camera's accelerations may change [s]",
+          true},
+        o.filter.motion_memory_s, 1e-3, 1e3);
   visit(F{"filter/landmark_noise_px",
           "process noise of a landmark as the view of it turns, per axis and root of a radian [px]",
           true},
