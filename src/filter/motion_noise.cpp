@@ -12,6 +12,10 @@ constexpr double kImageDegrees = 3.0;  // Derivation: three axes
 /// predictive t distribution a kurtosis.
 constexpr double kFewestImages = 2.0;
 
+/// Prior of the probability of a jerk, as sure as so many images. Standard: contamination of 5 % in
+/// robust statistics (Huber 1964).
+constexpr double kPriorImages = 20.0, kPriorJerks = 1.0;
+
 /// Standard deviation of the predictive distribution.
 double predictiveSigma(const VarianceScale& scale, double widest) {
   if (!(scale.degrees() > 2.0)) return widest;
@@ -34,6 +38,15 @@ void MotionNoise::setOptions(const FilterOptions& options) {
 }
 
 void MotionNoise::reset() { linear_ = angular_ = VarianceScale(0.0, 0.0); }
+
+double MotionNoise::jerkProbability() const {
+  return (kPriorJerks + jerks_) / (kPriorImages + images_);
+}
+
+void MotionNoise::countImage(bool is_jerk) {
+  ++images_;
+  if (is_jerk) ++jerks_;
+}
 
 void MotionNoise::rescale(double factor) {
   linear_ = VarianceScale(factor * factor * linear_.scale(), linear_.degrees());

@@ -48,6 +48,8 @@ std::optional<MeasurementPrior> guidedPrior(const FrameState& frame,
 /// The prior of a frame in which the camera jerks.
 MeasurementPrior jerkPrior(const FrameState& frame) {
   MeasurementPrior prior = frame.prior;
+  prior.wide_probability = 0.0;
+  prior.wide_S.resize(0, 0);
   if (frame.jerk_px.cols() > 0) prior.S += frame.jerk_px * frame.jerk_px.transpose();
   return prior;
 }
@@ -90,24 +92,29 @@ void MatchCascade::match(const MatchOptions& matching, bool fallbacks, FrameStat
 void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* frame) {
   const double scale = pixelScale(frame->image.cols);
   const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2 * scale * scale;
+  const bool can_jerk = frame->jerk_px.size() > 0 && !frame->jerk_px.isZero();
   const auto guided = is_wide ? guidedPrior(*frame, frame->prior) : std::nullopt;
+  if (can_jerk && !guided) {
+    frame->prior.wide_S = jerkPrior(*frame).S;
+    frame->prior.wide_probability = frame->jerk_probability;
+  }
   frame->matching = matcher_->match(guided ? *guided : frame->prior, frame->search,
                                     withBudget(matching, options_.first_budget_fraction, *frame));
-  if (expectedMatches(*frame) < options_.minimum_expected) return;
-  if (isPoor(*frame)) {
-    MeasurementPrior jerk = jerkPrior(*frame);
-    const auto guided_jerk =
-        is_wide && frame->jerk_px.isZero() ? guided : guidedPrior(*frame, jerk);
+  bool is_jerk = frame->matching.is_wide;
+  if (expectedMatches(*frame) >= options_.minimum_expected && isPoor(*frame)) {
+    const MeasurementPrior jerk = jerkPrior(*frame);
+    const bool is_tried = is_wide && !can_jerk;
+    const auto guided_jerk = is_tried ? guided : guidedPrior(*frame, jerk);
     const MeasurementPrior& wide = guided_jerk ? *guided_jerk : jerk;
-    const bool is_tried = is_wide && frame->jerk_px.isZero();
-    const bool is_retried = !is_tried && retry(matching, wide, frame);
-    const bool is_consensus = frame->poor_frames <= options_.maximum_poor_frames &&
-                              tryConsensusMatchers(matching, wide, frame);
-    if (is_retried || is_consensus) {
-      frame->is_jerk = !frame->jerk_px.isZero();
-      frame->prior = std::move(jerk);
-    }
+    if (!is_tried && (guided_jerk || can_jerk)) is_jerk |= retry(matching, wide, frame);
+    if (frame->poor_frames <= options_.maximum_poor_frames)
+      is_jerk |= tryConsensusMatchers(matching, wide, frame);
   }
+  if (is_jerk && can_jerk) {
+    frame->is_jerk = true;
+    frame->prior = jerkPrior(*frame);
+  }
+  if (expectedMatches(*frame) < options_.minimum_expected) return;
   if (!isFalseAlarm(*frame)) return;
   MatchResult& result = frame->matching;
   std::fill(result.match_of_feature.begin(), result.match_of_feature.end(), -1);

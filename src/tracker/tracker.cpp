@@ -31,8 +31,22 @@ class StopWatch {
 }  // namespace
 
 void Tracker::Implementation::reset(const std::string& reason) {
+  lost_maps_.clear();
+  awaits_loaded_map_ = false;
+  abandonMap(reason);
+}
+
+/// The next image begins another map. Those in which the camera was lost before are kept.
+void Tracker::Implementation::abandonMap(const std::string& reason) {
+  clearMap();
   state_ = TrackingState::kWaiting;
   reason_ = reason;
+  map_number_ = maps_begun_++;
+  ++resets_;
+  ++jumps_;
+}
+
+void Tracker::Implementation::clearMap() {
   map_.clear();
   map_monitor_.reset();
   initialiser_.end();
@@ -44,7 +58,6 @@ void Tracker::Implementation::reset(const std::string& reason) {
   scale_source_ = ScaleSource::kFree;
   previous_image_.release();
   poor_frames_ = 0;
-  ++resets_;
 }
 
 void Tracker::Implementation::setOptions(const TrackerOptions& options) {
@@ -161,6 +174,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   previous_image_ = image.clone();  // the caller may use its memory again
   if (poor_frames_ == 0) reference_image_ = previous_image_;
   frame->state = state_;
+  if (!lost_maps_.empty()) lookForOtherMaps(image, frame.get());
   if (!reason_.empty()) frame->reason = reason_;
   describeState(frame.get());
   if (current) describeMatches(std::move(*current), frame.get());

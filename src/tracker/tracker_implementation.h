@@ -67,6 +67,11 @@ class Tracker::Implementation {
   void lose(const std::string& reason);
   void relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame);
   bool relocalise(const cv::Mat& image, TrackedFrame* frame);
+  void placeCamera(const Relocalisation& found, TrackedFrame* frame);
+  bool beginNewMap(const cv::Mat& image, TrackedFrame* frame);
+  void lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame);
+  void abandonMap(const std::string& reason);
+  void clearMap();
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
@@ -82,6 +87,19 @@ class Tracker::Implementation {
   void describeState(TrackedFrame* frame) const;
   static void describeMatches(FrameState current, TrackedFrame* frame);
 
+  /// All that is kept of a map while the camera is in another.
+  struct LostMap {
+    int number;
+    double lost_stamp_s;
+    Ekf filter;
+    FrameNoise noise;
+    FeatureMap map;
+    MapMonitor monitor;
+    ScaleSource scale_source;
+  };
+  LostMap storeMap();
+  void takeMap(LostMap stored);
+
   CameraModel camera_;
   TrackerOptions options_;
   Ekf filter_;
@@ -95,6 +113,12 @@ class Tracker::Implementation {
   MapStructure structure_;
   MapStructure::Snapshot structure_snapshot_;
 
+  std::vector<LostMap> lost_maps_;  ///< the one that was lost last at the end
+  std::size_t next_lost_map_ = 0;   ///< to be looked for
+  double last_look_stamp_s_ = 0.0;  ///< when one was looked for
+  int map_number_ = 0, maps_begun_ = 1;
+  bool awaits_loaded_map_ = false;  ///< the camera has not been found yet in the map that was loaded
+
   TrackingState state_ = TrackingState::kWaiting;
   std::string reason_;
   ScaleSource scale_source_ = ScaleSource::kFree;
@@ -106,7 +130,7 @@ class Tracker::Implementation {
   double state_stamp_s_ = 0.0;  ///< of the filter's state
   double lost_stamp_s_ = 0.0;   ///< when the camera was lost
   std::int64_t images_ = 0;
-  int resets_ = 0, times_lost_ = 0;
+  int resets_ = 0, times_lost_ = 0, jumps_ = 0;
   int poor_frames_ = 0;  ///< with too few matches, in a row
 };
 

@@ -59,6 +59,7 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
       impulseVariance(motion_noise_.widest(), current->predicted_interval_s) -
       impulseVariance(motion_noise_.expected(), current->predicted_interval_s);
   current->jerk_px = predicted.impulse_px * jerk.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  current->jerk_probability = motion_noise_.jerkProbability();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {
     if (ids[i] != prior.ids[kept]) continue;
@@ -113,6 +114,7 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 
+  motion_noise_.countImage(current->is_jerk);
   if (!are_depths_guessed) motion_noise_.learn(report, allowed, current->predicted_interval_s);
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
   learnSlopes(*current);

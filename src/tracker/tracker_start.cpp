@@ -66,6 +66,7 @@ bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame
   if (initialiser_.isFirstUnrelated()) {
     start(current.image, frame);
     ++resets_;
+    ++jumps_;
     frame->reason = "the first image has nothing to do with the second: started anew from it";
     return true;
   }

@@ -25,12 +25,18 @@ class MotionNoise {
   Accelerations expected() const;
   Accelerations widest() const { return widest_; }
 
+  /// Of an image in which an acceleration as wide as widest() is needed to explain the matches, by
+  /// the images so far (a beta distribution).
+  double jerkProbability() const;
+  void countImage(bool is_jerk);
+
   /// Learns from an update after a prediction over `interval_s` with `allowed` accelerations.
   void learn(const UpdateReport& report, const Accelerations& allowed, double interval_s);
 
  private:
   Accelerations widest_;
   double memory_s_ = 0.0;
+  double images_ = 0.0, jerks_ = 0.0;
   VarianceScale linear_{0.0, 0.0}, angular_{0.0, 0.0};  ///< [(m/s^2)^2, (rad/s^2)^2]
 };
 

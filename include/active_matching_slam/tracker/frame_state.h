@@ -37,6 +37,7 @@ struct FrameState {
   /// 2F x any: what a jerk, an acceleration as wide as the options expect, adds to the prior's S is
   /// this times its transpose.
   Eigen::MatrixXd jerk_px;
+  double jerk_probability = 0.0;
   /// The last image with enough matches, whose camera is known. Empty when there is none.
   cv::Mat reference_image;
 

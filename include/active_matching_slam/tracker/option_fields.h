@@ -54,7 +54,11 @@ void visitOptions(Options& o, Visitor&& visit) {
       o.lost_after_frames, 1, 10000);
   visit(F{"minimum_matches", "fewer matches in a frame are too few", true}, o.minimum_matches, 1,
         1000);
-  visit(F{"reset_when_lost_after_s", "start anew when lost for so long [s]; 0: keep looking", true},
+  visit(F{"new_map_when_lost_after_s",
+          "begin a new map when lost for so long, and look for the old one on the side [s]; 0: never",
+          true},
+        o.new_map_when_lost_after_s, 0.0, 1e6);
+  visit(F{"reset_when_lost_after_s", "give up a map that was lost so long ago [s]; 0: keep looking for it", true},
         o.reset_when_lost_after_s, 0.0, 1e6);
 
   visit(F{"filter/sigma_acceleration_mps2",

@@ -46,7 +46,8 @@ struct TrackerOptions {
   double max_frame_interval_s = 0.5;     ///< after a longer gap the whole image is searched first
   int lost_after_frames = 15;            ///< consecutive frames with too few matches
   int minimum_matches = 4;               ///< fewer is 'too few'
-  double reset_when_lost_after_s = 0.0;  ///< 0: never reset, keep looking for the map
+  double new_map_when_lost_after_s = 1.0;  ///< the old one is kept and looked for; 0: never
+  double reset_when_lost_after_s = 0.0;  ///< give up the map that was lost; 0: never
   bool learn_rates = true;               ///< of each feature's true and false matches
   bool fallback_matchers = true;         ///< where few match, see MatchCascade
   bool structure = false;                ///< maintain the MI graph and the submaps
