@@ -38,6 +38,8 @@ class FrameNoise {
 
   /// Standard deviation per axis [px] of a typical match in the last image.
   double typicalSigma_px() const { return noise_.typicalSigma_px(); }
+  /// MeasurementNoise::varianceFactor().
+  double varianceFactor() const { return noise_.varianceFactor(); }
 
  private:
   FilterOptions options_;

@@ -55,6 +55,7 @@ void Tracker::Implementation::clearMap() {
   filter_.reset(CameraState(), MotionCovariance::Zero());
   noise_.reset();
   motion_noise_.reset();
+  quality_.reset();
   scale_source_ = ScaleSource::kFree;
   previous_image_.release();
   poor_frames_ = 0;

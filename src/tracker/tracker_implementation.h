@@ -14,6 +14,7 @@
 #include "active_matching_slam/tracker/frame_state.h"
 #include "active_matching_slam/tracker/match_cascade.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "active_matching_slam/tracker/tracking_quality.h"
 #include "frame_noise.h"
 
 namespace active_matching_slam {
@@ -62,6 +63,7 @@ class Tracker::Implementation {
   static std::vector<FeatureMeasurement> selectMeasurements(const FrameState& current);
   void learnSlopes(const FrameState& current);
   void recordSearches(const FrameState& current, std::int64_t index);
+  void judgeQuality(const FrameState& current);
   bool giveUpWrongMap(const FrameState& current, TrackedFrame* frame);
   void updateTrackingState(const FrameState& current);
   void lose(const std::string& reason);
@@ -105,6 +107,7 @@ class Tracker::Implementation {
   Ekf filter_;
   FrameNoise noise_;
   MotionNoise motion_noise_;
+  TrackingQuality quality_;
   Initialiser initialiser_;
   FeatureMap map_;
   MapMonitor map_monitor_;
@@ -117,7 +120,8 @@ class Tracker::Implementation {
   std::size_t next_lost_map_ = 0;   ///< to be looked for
   double last_look_stamp_s_ = 0.0;  ///< when one was looked for
   int map_number_ = 0, maps_begun_ = 1;
-  bool awaits_loaded_map_ = false;  ///< the camera has not been found yet in the map that was loaded
+  bool awaits_loaded_map_ =
+      false;  ///< the camera has not been found yet in the map that was loaded
 
   TrackingState state_ = TrackingState::kWaiting;
   std::string reason_;

@@ -49,6 +49,8 @@ void Tracker::Implementation::updateTrackingState(const FrameState& current) {
   }
   ++poor_frames_;
   std::ostringstream reason;
+  if (current.matching.statistics.cut_short)
+    reason << "out of time after " << current.matching.statistics.searches << " searches: ";
   reason << matched << " of " << current.prior.size() << " features matched, "
          << options_.minimum_matches << " are needed";
   reason_ = reason.str();
@@ -137,8 +139,8 @@ bool Tracker::Implementation::beginNewMap(const cv::Mat& image, TrackedFrame* fr
   return true;
 }
 
-/// While the camera is tracked in one map, looks for it in those in which it was lost. Found, it goes
-/// on in that one; the other is kept in its place.
+/// While the camera is tracked in one map, looks for it in those in which it was lost. Found, it
+/// goes on in that one; the other is kept in its place.
 void Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame) {
   if (options_.reset_when_lost_after_s > 0.0) {
     lost_maps_.erase(std::remove_if(lost_maps_.begin(), lost_maps_.end(),

@@ -119,6 +119,7 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
   learnSlopes(*current);
   recordSearches(*current, frame->index);
+  if (!are_depths_guessed && !frame->repeated_image) judgeQuality(*current);
 }
 
 /// The accepted matches that pass the innovation gate, with the noise of their templates' fit.
@@ -140,6 +141,20 @@ void Tracker::Implementation::learnSlopes(const FrameState& current) {
     map_.learnSlope(current.candidates[i], current.templates[i], current.image,
                     current.measurements[k].pixel);
   }
+}
+
+/// Whether what was found fits the model.
+void Tracker::Implementation::judgeQuality(const FrameState& current) {
+  QualitySigns signs;
+  signs.variance_factor = noise_.varianceFactor();
+  signs.matched = static_cast<int>(current.inliers.size());
+  for (int i = 0; i < current.prior.size(); ++i) {
+    if (current.search.searchedPixels(i).size() == 0) continue;
+    ++signs.predicted;
+    if (!current.search.matches(i).empty()) ++signs.rejected;
+  }
+  signs.rejected -= signs.matched;
+  quality_.add(current.interval_s, signs, filter_.camera(), filter_.options());
 }
 
 /// The record of each feature that was searched.

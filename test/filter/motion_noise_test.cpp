@@ -91,6 +91,20 @@ TEST(MotionNoise, StaysWhereImagesTellNothingAndNeverExceedsTheWidest) {
   EXPECT_EQ(noise.expected().angular_rps2, options.sigma_angular_acceleration_rps2);
 }
 
+TEST(MotionNoise, CountsJerks) {
+  MotionNoise never(FilterOptions{}), often(FilterOptions{});
+  const double before = never.jerkProbability();
+  EXPECT_GT(before, 0.0);
+  EXPECT_LT(before, 0.2);
+  for (int k = 0; k < 1000; ++k) {
+    never.countImage(false);
+    often.countImage(k % 4 == 0);
+  }
+  EXPECT_GT(never.jerkProbability(), 0.0) << "the next may come";
+  EXPECT_LT(never.jerkProbability(), 0.1 * before);
+  EXPECT_NEAR(often.jerkProbability(), 0.25, 0.01);
+}
+
 TEST(MotionNoise, GrowsWithTheUnitOfTheMap) {
   MotionNoise noise(FilterOptions{});
   std::mt19937 random(5);

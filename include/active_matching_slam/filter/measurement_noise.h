@@ -68,6 +68,8 @@ class MeasurementNoise {
   double sigma_px(const FitPrecision& fit, const LandmarkNoise& landmark) const;
   /// The same of a typical match in the last image; before any, FilterOptions::sigma_px.
   double typicalSigma_px() const;
+  /// c_k, as learnt so far; 0: nothing is.
+  double varianceFactor() const { return has_learnt_ ? scale_.scale() : 0.0; }
   /// Degrees of freedom of the prior of c_k in the image in hand.
   double degrees() const;
   /// FeatureMeasurement::variance_inflation of such a match: its long-run variance over its
