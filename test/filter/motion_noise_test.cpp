@@ -118,7 +118,7 @@ TEST(MotionNoise, GrowsWithTheUnitOfTheMap) {
 /// Cameras drawn from the filter's state, moved by drawn accelerations: what the updates tell of
 /// these is right where the filter allows for as much, and tells too little from too much.
 TEST(MotionNoise, LearnsTheAccelerationsOfACameraFromTheUpdatesOfItsFilter) {
-  const CameraModel model = exampleModel();
+  const CameraModel model(exampleCalibration());
   constexpr double kInterval_s = 0.05, kSigma_px = 0.5;
   const Accelerations truth{6.0, 9.0};
   for (const double factor : {0.3, 1.0, 4.0}) {
