@@ -97,7 +97,7 @@ void MatchCascade::retryGuided(const MatchOptions& matching, FrameState* frame) 
   const auto guided = guidedPrior(*frame);
   if (!guided) return;
   ImageFeatureSearch search = frame->search;
-  search.beginFrame(frame->image, frame->templates);
+  search.beginFrame(frame->image, frame->templates, frame->sources);
   const double minimum_matches =
       std::max(options_.replacing_ratio * frame->matching.statistics.matched,
                options_.majority_fraction * expectedMatches(*frame));
