@@ -46,6 +46,7 @@ SearchOutcome PointListSearch::search(int feature, const SearchEllipse& ellipse)
     outcome.pixels_in_ellipse += run.end_u - run.begin_u;
     outcome.pixels_new += f.searched.insert(run);
   });
+  outcome.correlations = outcome.pixels_new;
   for (std::size_t i = 0; i < f.points.size(); ++i) {
     if (!isInBox(f.points[i], valid_)) continue;
     if (!(mahalanobisSquared(ellipse, f.points[i]) <= kEllipseRadius2)) continue;

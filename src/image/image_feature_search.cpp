@@ -56,7 +56,8 @@ ImageFeatureSearch::ImageFeatureSearch(const ImageOptions& options)
     : options_(checked(options)),
       correlator_(std::max(1.0, kContrastLoss * options.minimum_contrast)) {}
 
-void ImageFeatureSearch::beginFrame(const cv::Mat& image, const std::vector<Template>& templates) {
+void ImageFeatureSearch::beginFrame(const cv::Mat& image, const std::vector<Template>& templates,
+                                    const std::vector<TemplateSource>& sources) {
   image_ = image.type() == CV_8UC1 ? image : cv::Mat();
   feature_count_ = static_cast<int>(templates.size());
   if (features_.size() < templates.size()) features_.resize(templates.size());
@@ -66,7 +67,17 @@ void ImageFeatureSearch::beginFrame(const cv::Mat& image, const std::vector<Temp
     feature.searched.clear();
     feature.box = emptyBox();
     feature.matches.clear();
+    feature.peaks.clear();
+    feature.is_wide = false;
+    feature.covered.clear();
+    feature.coarse_pixels = feature.coarse_clutter_pixels = 0.0;
+    for (CoarseLevel& level : feature.coarse) {
+      level.is_made = false;
+      level.searched.clear();
+    }
   }
+  pyramid_.begin(image_);
+  sources_ = sources;
   pixels_searched_ = 0;
 }
 
@@ -79,7 +90,7 @@ PixelBox ImageFeatureSearch::validArea(int feature) const {
 }
 
 int ImageFeatureSearch::countNewPixels(int feature, const SearchEllipse& ellipse) const {
-  const PixelMask& searched = features_[feature].searched;
+  const PixelMask& searched = searchedPixels(feature);
   int count = 0;
   forEachEllipseRun(ellipse, validArea(feature),
                     [&](const PixelRun& run) { count += searched.countMissing(run); });
@@ -91,22 +102,34 @@ SearchOutcome ImageFeatureSearch::search(int feature_index, const SearchEllipse&
   const PixelBox valid = validArea(feature_index);
   SearchOutcome outcome;
   if (!isProperEllipse(ellipse)) return outcome;
-  added_.clear();
-  candidates_.clear();
-  forEachEllipseRun(ellipse, valid, [&](const PixelRun& run) {
-    outcome.pixels_in_ellipse += run.end_u - run.begin_u;
-    outcome.pixels_new += addRun(feature, run);
-  });
-  scoreAddedRuns(feature);
-  // The list grows while it is worked off.
-  for (std::size_t i = 0; i < candidates_.size(); ++i) {
-    const Candidate candidate = candidates_[i];
-    outcome.pixels_new += decideCandidate(feature, candidate, valid);
+  const std::int64_t searched_before = searchedPixels(feature_index).size();
+  const std::int64_t correlated_before = pixels_searched_;
+  outcome.pixels_in_ellipse = countEllipsePixels(ellipse, valid);
+  const int level = coarseLevel(feature_index, ellipse, outcome.pixels_in_ellipse);
+  if (level > 0) {
+    searchCoarseToFine(feature, ellipse, valid, level);
+  } else {
+    searchPixels(feature, ellipse, valid);
   }
+  outcome.pixels_new = static_cast<int>(searchedPixels(feature_index).size() - searched_before);
+  outcome.correlations = static_cast<int>(pixels_searched_ - correlated_before);
   for (const SearchMatch& match : feature.matches)
     if (mahalanobisSquared(ellipse, match.pixel) <= kEllipseRadius2)
       outcome.matches.push_back(match.id);
   return outcome;
+}
+
+void ImageFeatureSearch::searchPixels(Feature& feature, const SearchEllipse& ellipse,
+                                      const PixelBox& valid) {
+  added_.clear();
+  candidates_.clear();
+  forEachEllipseRun(ellipse, valid, [&](const PixelRun& run) { addSearchedRun(feature, run); });
+  scoreAddedRuns(feature);
+  // The list grows while it is worked off.
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    const Candidate candidate = candidates_[i];
+    decideCandidate(feature, candidate, valid);
+  }
 }
 
 const std::vector<SearchMatch>& ImageFeatureSearch::matches(int feature) const {
@@ -114,7 +137,8 @@ const std::vector<SearchMatch>& ImageFeatureSearch::matches(int feature) const {
 }
 
 const PixelMask& ImageFeatureSearch::searchedPixels(int feature) const {
-  return features_[feature].searched;
+  const Feature& known = features_[feature];
+  return known.is_wide ? known.covered : known.searched;
 }
 
 const SearchMatch* ImageFeatureSearch::bestMatch(int feature) const {
@@ -125,11 +149,21 @@ const SearchMatch* ImageFeatureSearch::bestMatch(int feature) const {
   return best == matches.end() ? nullptr : &*best;
 }
 
-/// Marks a run as searched; its new parts are appended to added_, to be scored.
-int ImageFeatureSearch::addRun(Feature& feature, const PixelRun& run) {
-  const int fresh = feature.searched.insert(run, &added_);
-  pixels_searched_ += fresh;
-  return fresh;
+/// Marks a run as correlated; its new parts are appended to added_, to be scored.
+void ImageFeatureSearch::addRun(Feature& feature, const PixelRun& run) {
+  pixels_searched_ += feature.searched.insert(run, &added_);
+  if (feature.is_wide) feature.covered.insert(run);
+}
+
+/// The same, less what was searched coarse to fine already.
+void ImageFeatureSearch::addSearchedRun(Feature& feature, const PixelRun& run) {
+  if (!feature.is_wide) {
+    addRun(feature, run);
+    return;
+  }
+  uncovered_.clear();
+  feature.covered.insert(run, &uncovered_);
+  for (const PixelRun& part : uncovered_) addRun(feature, part);
 }
 
 /// Scores the pixels of added_ into the feature's map and lists those that may be matches.
@@ -170,36 +204,39 @@ void ImageFeatureSearch::coverBox(Feature& feature, const PixelBox& box) {
   feature.box = grown;
 }
 
-/// Finds out whether a candidate is a local maximum; returns how many pixels that cost. Neighbours
+/// Finds out whether a candidate is a local maximum. Neighbours
 /// scored for it that are better become candidates themselves, so that every searched pixel is in
 /// the end either below the threshold, beaten by a neighbour, or a match.
-int ImageFeatureSearch::decideCandidate(Feature& feature, const Candidate& candidate,
-                                        const PixelBox& valid) {
+void ImageFeatureSearch::decideCandidate(Feature& feature, const Candidate& candidate,
+                                         const PixelBox& valid) {
   // Neighbours just outside the valid area may be scored to decide, but are no matches.
-  if (!contains(valid, candidate.u, candidate.v)) return 0;
+  if (!contains(valid, candidate.u, candidate.v)) return;
   const int u = candidate.u, v = candidate.v;
   for (int dv = -1; dv <= 1; ++dv)
     for (int du = -1; du <= 1; ++du)
       if (feature.searched.contains(u + du, v + dv) &&
           beats(Candidate{u + du, v + dv, feature.scores[indexOf(feature.box, u + du, v + dv)]},
                 candidate))
-        return 0;
+        return;
   const std::size_t known = candidates_.size();
-  int fresh = 0;
-  for (int dv = -1; dv <= 1; ++dv) fresh += addRun(feature, {v + dv, u - 1, u + 2});
+  for (int dv = -1; dv <= 1; ++dv) addRun(feature, {v + dv, u - 1, u + 2});
   scoreAddedRuns(feature);
   const auto worse = [&](const Candidate& other) { return !beats(other, candidate); };
   candidates_.erase(std::remove_if(candidates_.begin() + known, candidates_.end(), worse),
                     candidates_.end());
-  if (candidates_.size() == known) addMatch(feature, candidate);
-  return fresh;
-}
-
-void ImageFeatureSearch::addMatch(Feature& feature, const Candidate& peak) {
+  if (candidates_.size() > known) return;
   float around[9];
   for (int dv = -1; dv <= 1; ++dv)
-    std::copy_n(&feature.scores[indexOf(feature.box, peak.u - 1, peak.v + dv)], 3,
-                &around[3 * (dv + 1)]);
+    std::copy_n(&feature.scores[indexOf(feature.box, u - 1, v + dv)], 3, &around[3 * (dv + 1)]);
+  addMatch(feature, candidate, around, 1.0);
+}
+
+/// `around`: the scores of the peak and its neighbours, row by row.
+void ImageFeatureSearch::addMatch(Feature& feature, const Candidate& peak, const float around[9],
+                                  double clutter) {
+  const cv::Point pixel(peak.u, peak.v);
+  if (std::find(feature.peaks.begin(), feature.peaks.end(), pixel) != feature.peaks.end()) return;
+  feature.peaks.push_back(pixel);
   const Eigen::Vector2d middle(peak.u, peak.v), start = middle + paraboloidPeak(around);
   const std::optional<TemplateFit> fit = refineSubpixel(image_, feature.patch, start);
   SearchMatch match;
@@ -210,6 +247,7 @@ void ImageFeatureSearch::addMatch(Feature& feature, const Candidate& peak) {
     match.noise_shape = fit->noise_shape;
   }
   match.score = peak.score;
+  match.clutter = clutter;
   match.id = static_cast<int>(feature.matches.size());
   feature.matches.push_back(match);
 }

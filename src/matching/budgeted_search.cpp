@@ -35,8 +35,8 @@ SearchOutcome BudgetedSearch::search(int feature, const SearchEllipse& ellipse) 
   SearchOutcome outcome = search_.search(prior_.original(feature), ellipse);
   correlation_s_ += now() - start;
   ++searches_;
-  pixels_ += outcome.pixels_new;
-  charge(kSearchMs + kPixelMs * static_cast<double>(outcome.pixels_new));
+  pixels_ += outcome.correlations;
+  charge(kSearchMs + kPixelMs * static_cast<double>(outcome.correlations));
   return outcome;
 }
 

@@ -23,6 +23,9 @@ class BudgetedSearch {
   const PixelMask& searchedPixels(int feature) const {
     return search_.searchedPixels(prior_.original(feature));
   }
+  double expectedCost(int feature, double area_px) const {
+    return search_.expectedCost(prior_.original(feature), area_px);
+  }
   PixelBox validArea(int feature) const { return search_.validArea(prior_.original(feature)); }
 
   /// Seconds of the options' clock, or of a steady clock.

@@ -87,10 +87,10 @@ Mixture::Evidence Mixture::evidenceOf(const Hypothesis& h, const std::vector<int
     }
     const SearchEllipse expected = chain.predict(f);
     if (!isProperEllipse(expected)) continue;
-    const Eigen::Vector2d& pixel = search_.matches(f)[slot(m)].pixel;
-    const double p = massOfPixel(pixel, expected.center, expected.covariance);
+    const SearchMatch& found = search_.matches(f)[slot(m)];
+    const double p = massOfPixel(found.pixel, expected.center, expected.covariance) / found.clutter;
     evidence.log_likelihood += std::log(std::max(likelihood(f).match * p, kLeast));
-    chain.condition(f, expected, pixel);
+    chain.condition(f, expected, found.pixel);
   }
   evidence.log_evidence = evidence.log_likelihood;
   const auto of = [&](int f) { return featureEvidence(h, f, chain.predict(f)); };
@@ -126,9 +126,10 @@ Mixture::FeatureEvidence Mixture::featureEvidence(const Hypothesis& h, int f,
   double all = 0.0, free = 0.0;
   for (int m = 0; m < static_cast<int>(known.size()); ++m) {
     const Eigen::Vector2d& pixel = known[slot(m)].pixel;
-    const double p = massOfPixel(pixel, predicted.center, predicted.covariance);
+    double p = massOfPixel(pixel, predicted.center, predicted.covariance);
     all += p;
     if (liesInAncestry(h, f, pixel)) continue;
+    p /= known[slot(m)].clutter;
     free += p;
     if (likelihood.match * p <= evidence.best_likelihood ||
         !(mahalanobisSquared(predicted, pixel) <= kEllipseRadius2))

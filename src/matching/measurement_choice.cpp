@@ -85,7 +85,7 @@ ExpectedInformation MeasurementChoice::evaluate(int g, int c) {
   expected.discrete_bits = entropy_ - expected.null_probability * after_null -
                            (1.0 - expected.null_probability) * after_match;
   expected.continuous_bits = child / match_sum * gate.bits;
-  expected.score = expected.bits() / gate.area;
+  expected.score = expected.bits() / gate.cost;
   return expected;
 }
 
@@ -98,7 +98,7 @@ double MeasurementChoice::bound(const Hypothesis& h, const Hypothesis::Candidate
   const double others = (1.0 - h.weight) * std::min(gate.area, likelihood.match + missed);
   const double probability = child / (child + std::max(own, 0.0) + std::max(others, 0.0));
   const double bits = entropy_ + probability * gate.bits;
-  return bits / gate.area * (1.0 + 1e-9);
+  return bits / gate.cost * (1.0 + 1e-9);
 }
 
 ExpectedInformation MeasurementChoice::takeIfBetter(int g, int c, Measurement& best) {
@@ -120,8 +120,8 @@ Measurement MeasurementChoice::best() {
     const auto& candidates = all[slot(g)].candidates;
     for (int c = 0; c < static_cast<int>(candidates.size()); ++c) {
       const Hypothesis::Candidate& gate = candidates[slot(c)];
-      if (!gate.open || !(entropy_ + gate.bits > most * gate.area)) continue;
-      most = (entropy_ + gate.bits) / gate.area;
+      if (!gate.open || !(entropy_ + gate.bits > most * gate.cost)) continue;
+      most = (entropy_ + gate.bits) / gate.cost;
       promising = {g, c, {}};
     }
   }
@@ -137,7 +137,7 @@ Measurement MeasurementChoice::best() {
       const double score = best.exists() ? best.expected.score : 0.0;
       // The first test is a weaker bound that costs next to nothing.
       if (best.exists() &&
-          ((entropy_ + gate.bits) * (1.0 + 1e-9) < score * gate.area || bound(h, gate) < score))
+          ((entropy_ + gate.bits) * (1.0 + 1e-9) < score * gate.cost || bound(h, gate) < score))
         continue;
       consider(g, c);
     }
@@ -182,7 +182,7 @@ Measurement MeasurementChoice::bestOf(int hypothesis) {
   Measurement best;
   double most = 0.0;
   for (int c = 0; c < static_cast<int>(candidates.size()); ++c) {
-    const double score = candidates[slot(c)].bits / candidates[slot(c)].area;
+    const double score = candidates[slot(c)].bits / candidates[slot(c)].cost;
     if (!(score > most) || !isCandidate(hypothesis, c)) continue;
     most = score;
     best = {hypothesis, c, {}};

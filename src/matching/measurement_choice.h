@@ -14,7 +14,7 @@ struct ExpectedInformation {
   double discrete_bits = 0.0;    ///< about which Gaussian is true; may be negative
   double continuous_bits = 0.0;  ///< about where the other features are
   double null_probability = 0.0;
-  double score = 0.0;  ///< bits per pixel of the ellipse
+  double score = 0.0;  ///< bits per correlation that the search will take
   double bits() const { return discrete_bits + continuous_bits; }
 };
 
@@ -33,7 +33,7 @@ class MeasurementChoice {
       : mixture_(mixture), skip_exhausted_(skip_exhausted) {}
 
   /// The candidate of the highest score; ties: the lower Gaussian, then the lower feature.
-  /// Candidates whose bound, (H(lambda) + most continuous information) / area, is below the best
+  /// Candidates whose bound, (H(lambda) + most continuous information) / cost, is below the best
   /// are skipped.
   Measurement best();
   /// The best of `count` candidates drawn at random, evenly spread over the Gaussians; `most_bits`:

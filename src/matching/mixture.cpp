@@ -198,6 +198,7 @@ void Mixture::addCandidate(Hypothesis& h, int f) const {
     candidate.child = likelihood(f).match * kEllipseMass;
     candidate.child_log = likelihood(f).child_log;
   }
+  candidate.cost = search_.expectedCost(f, candidate.area);
   for (int i = h.ancestry[slot(f)]; i >= 0; i = searched_[slot(i)].next)
     if (liesInside(ellipse, searched_[slot(i)].ellipse)) return;
   h.candidate_of[slot(f)] = static_cast<int>(h.candidates.size());
@@ -299,16 +300,17 @@ void Mixture::fuse(int g, int c, int match) {
   Hypothesis& h = hypotheses_[slot(g)];
   const Hypothesis::Candidate& candidate = h.candidates[slot(c)];
   const int f = candidate.feature;
-  double taken = 0.0, all = 0.0;
+  double taken = 0.0, all = 0.0, claimed = 0.0;
   for (int m = 0; m < static_cast<int>(search_.matches(f).size()); ++m) {
-    const double p =
-        massOfPixel(search_.matches(f)[slot(m)].pixel, h.mean[slot(f)], h.covariance(f));
+    const SearchMatch& known = search_.matches(f)[slot(m)];
+    const double p = massOfPixel(known.pixel, h.mean[slot(f)], h.covariance(f));
     all += p;
-    if (m == match) taken = p;
+    claimed += p / known.clutter;
+    if (m == match) taken = p / known.clutter;
   }
   const SearchLikelihood& of = likelihood(f);
   const double missed = of.in * std::max(0.0, candidate.mass - all) + 1.0 - candidate.mass;
-  kept_ *= of.match * taken / (of.match * all + missed);
+  kept_ *= of.match * taken / (of.match * claimed + missed);
   Hypothesis fused = spawn(h, f, {match, h.log_weight});
   fused.id = h.id;
   fused.parent = h.parent;

@@ -53,6 +53,7 @@ struct Hypothesis {
     bool open = true;           ///< not searched here yet
     bool clipped = false;       ///< the ellipse reaches beyond the valid area
     double area = 0.0;          ///< of the 3-sigma ellipse inside the valid area [px^2]
+    double cost = 0.0;          ///< expected correlations of its search
     double mass = 0.0;          ///< own probability mass inside
     double bits = 0.0;          ///< continuous information of a match
     double child = 0.0;         ///< match * mass: a match's factor for the child

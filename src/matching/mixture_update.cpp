@@ -50,7 +50,7 @@ double Mixture::explained(Hypothesis& h, int f) {
   for (const SearchMatch& m : known) {
     const double p = massOfPixel(m.pixel, h.mean[slot(f)], covariance);
     all += p;
-    if (!liesInAncestry(h, f, m.pixel)) foreign += p;
+    if (!liesInAncestry(h, f, m.pixel)) foreign += p / m.clutter;
   }
   const SearchLikelihood& likelihood = this->likelihood(f);
   const double z = likelihood.match * foreign + likelihood.in * std::max(0.0, searched_mass - all) +
@@ -80,9 +80,9 @@ void Mixture::updateIncremental(int g, int c, MatchStep& step, std::vector<Child
   const int ancestry_after = searcher.ancestry[slot(f)];
   searcher.ancestry[slot(f)] = ancestry_before;
   for (const int m : outcome.matches) {
-    const Eigen::Vector2d& pixel = search_.matches(f)[slot(m)].pixel;
-    if (liesInAncestry(searcher, f, pixel)) continue;
-    const double p = massOfPixel(pixel, searcher.mean[slot(f)], covariance);
+    const SearchMatch& found = search_.matches(f)[slot(m)];
+    if (liesInAncestry(searcher, f, found.pixel)) continue;
+    const double p = massOfPixel(found.pixel, searcher.mean[slot(f)], covariance) / found.clutter;
     children.push_back({m, base + std::log(likelihood(f).match * p)});
   }
   searcher.ancestry[slot(f)] = ancestry_after;
@@ -104,14 +104,16 @@ void Mixture::updateThesis(int g, int c, MatchStep& step, std::vector<Child>& ch
     if (!(h.joint->marginal(f).determinant > 0.0)) continue;
     search_.charge(kWeighingMs);
     const Eigen::Matrix2d covariance = h.covariance(f);
-    double sum = 0.0;
+    double sum = 0.0, claimed = 0.0;
     for (const int m : outcome.matches) {
-      const double p = massOfPixel(search_.matches(f)[slot(m)].pixel, h.mean[slot(f)], covariance);
+      const SearchMatch& found = search_.matches(f)[slot(m)];
+      const double p = massOfPixel(found.pixel, h.mean[slot(f)], covariance);
       sum += p;
-      if (k == g) children.push_back({m, base + std::log(likelihood.match * p)});
+      claimed += p / found.clutter;
+      if (k == g) children.push_back({m, base + std::log(likelihood.match * p / found.clutter)});
     }
     const double inside = mass(k, c, g);
-    const double factor = (k == g ? 0.0 : likelihood.match * sum) +
+    const double factor = (k == g ? 0.0 : likelihood.match * claimed) +
                           likelihood.in * std::max(0.0, inside - sum) + 1.0 - inside;
     h.log_weight += std::log(std::max(factor, kLeastLikelihood));
   }

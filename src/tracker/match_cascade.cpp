@@ -124,7 +124,7 @@ void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* 
 bool MatchCascade::retry(const MatchOptions& matching, const MeasurementPrior& prior,
                          FrameState* frame) const {
   ImageFeatureSearch search = frame->search;
-  search.beginFrame(frame->image, frame->templates);
+  search.beginFrame(frame->image, frame->templates, frame->sources);
   const double minimum_matches =
       std::max(options_.replacing_ratio * frame->matching.statistics.matched,
                options_.majority_fraction * expectedMatches(*frame));

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "active_matching_slam/filter/measurement_model.h"
@@ -82,8 +83,10 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
   chooseCandidates(&current);
   predictMeasurements(&current);
   const Eigen::Isometry3d T_reference_world = T_world_reference_.inverse();
-  for (const FeatureId id : current.prior.ids) {
+  for (std::size_t i = 0; i < current.prior.ids.size(); ++i) {
+    const FeatureId id = current.prior.ids[i];
     const MapFeature& feature = *map_.find(id);
+    current.sources.push_back({feature.patch, current.candidates[i].view});
     current.match_probabilities.push_back(feature.recent_rate);
     if (options_.learn_rates)
       current.prior.rates.push_back(feature.rates.rates({options_.matching.default_rates}));
@@ -91,7 +94,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
     current.reference_px.push_back(camera_.project(T_reference_world.linear() * point.head<3>() +
                                                    point.w() * T_reference_world.translation()));
   }
-  current.search.beginFrame(image, current.templates);
+  current.search.beginFrame(image, current.templates, current.sources);
   return current;
 }
 
@@ -163,14 +166,14 @@ void Tracker::Implementation::recordSearches(const FrameState& current, std::int
   std::size_t next = 0;
   for (int i = 0; i < current.prior.size(); ++i) {
     const bool used = next < current.inliers.size() && current.inliers[next] == i;
-    const std::int64_t pixels = current.search.searchedPixels(i).size();
+    const double pixels = current.search.clutterPixels(i);
     const Eigen::Vector2d innovation_px =
         used ? Eigen::Vector2d(current.measurements[next++].pixel - current.prior.mean(i))
              : Eigen::Vector2d::Zero();
-    if (used || pixels > 0)
+    if (used || pixels > 0.0)
       records.push_back({current.prior.ids[i], used,
-                         static_cast<std::int64_t>(current.search.matches(i).size()), pixels,
-                         innovation_px});
+                         static_cast<std::int64_t>(current.search.matches(i).size()),
+                         std::llround(pixels), innovation_px});
   }
   map_.record(records, index);
 }

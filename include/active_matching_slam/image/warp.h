@@ -71,4 +71,16 @@ class SourceOffset {
 bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_size_px,
                   Template* result);
 
+/// What a feature's templates are warped from.
+struct TemplateSource {
+  SourcePatch patch;
+  PatchView view;
+};
+
+/// The same on a copy of the image that is halved `level` times (ImagePyramid): of side
+/// `template_size_px`, or of the largest smaller one, from 5 on, that the stored patch reaches to.
+/// It shows more of the surroundings than the template does.
+bool warpCoarseTemplate(const TemplateSource& source, int level, int template_size_px,
+                        Template* result);
+
 }  // namespace active_matching_slam

@@ -51,7 +51,7 @@ struct MatchOptions {
   std::uint64_t seed = 1;           ///< fast_active, one_point_ransac
 
   // Budget of a frame, which ends with the search that uses it up.
-  std::int64_t max_pixels = 0;    ///< distinct pixels searched; 0: no limit
+  std::int64_t max_pixels = 0;    ///< pixels correlated; 0: no limit
   double max_milliseconds = 0.0;  ///< 0: no limit
   /// The budget's milliseconds come from a model of the work done and not from the clock: the same
   /// result on every machine, every time.

@@ -33,7 +33,7 @@ struct MatchStep {
   double discrete_information_bits = 0.0;
   double continuous_information_bits = 0.0;
   double mutual_information_bits = 0.0;  ///< I(z_f; rest) in this Gaussian
-  double score = 0.0;                    ///< (discrete + continuous) / area
+  double score = 0.0;                    ///< (discrete + continuous) / expected cost
   double null_probability = 0.0;         ///< predicted probability of no match
   int pixels_in_ellipse = 0;
   int pixels_new = 0;
@@ -48,7 +48,7 @@ struct MatchStatistics {
   int candidates = 0;   ///< F
   int matched = 0;
   int searches = 0;
-  std::int64_t pixels_searched = 0;     ///< distinct pixels, summed over features
+  std::int64_t pixels_searched = 0;     ///< correlations, summed over features: their cost
   std::int64_t pixels_full_gates = 0;   ///< pixels of the prior's 3-sigma ellipses, summed
   int matches_met = 0;                  ///< distinct (feature, match) found
   int max_gaussians = 0;                ///< most live at once, before pruning

@@ -30,6 +30,7 @@ struct FrameState {
   // Of each feature chosen to be measured, in the order of `prior`.
   std::vector<VisibleFeature> candidates;
   std::vector<Template> templates;
+  std::vector<TemplateSource> sources;      ///< of these
   std::vector<double> match_probabilities;  ///< by the feature's recent record
   /// Where it was in `reference_image`; empty where it was not in view.
   std::vector<std::optional<Eigen::Vector2d>> reference_px;
