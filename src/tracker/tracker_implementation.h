@@ -35,8 +35,8 @@ class Tracker::Implementation {
         filter_(withTrustIn(camera.calibration(), options.filter)),
         noise_(options.filter),
         motion_noise_(options.filter),
-        cascade_(options.matcher),
-        relocaliser_({}, options.map, options.image) {
+        cascade_(options.matcher, options.cascade),
+        relocaliser_(options.relocaliser, options.map, options.image) {
     checkTrackerOptions(options);
   }
 
