@@ -21,7 +21,8 @@ class MotionNoise {
   void rescale(double factor);
 
   /// Standard deviations that the next image is predicted with: of the predictive distribution,
-  /// Student's t, as a Gaussian of its variance, at most widest().
+  /// Student's t, as a Gaussian of its variance; inflated to the long-run variance, since
+  /// accelerations last; at most widest().
   Accelerations expected() const;
   Accelerations widest() const { return widest_; }
 
@@ -36,6 +37,7 @@ class MotionNoise {
  private:
   Accelerations widest_;
   double memory_s_ = 0.0;
+  double interval_s_ = 0.0;  ///< of the last update
   double images_ = 0.0, jerks_ = 0.0;
   VarianceScale linear_{0.0, 0.0}, angular_{0.0, 0.0};  ///< [(m/s^2)^2, (rad/s^2)^2]
 };
