@@ -8,8 +8,8 @@
 namespace active_matching_slam {
 namespace {
 
-/// Pixels from which on a search is coarse to fine, and about how many it has on its coarsest level.
-/// Cost: at fewer, what is found there takes as long to be looked at again as it saves.
+/// Pixels from which on a search is coarse to fine, and about how many it has on its coarsest
+/// level. Cost: at fewer, what is found there takes as long to be looked at again as it saves.
 constexpr double kWidePx = 4000.0, kCoarsePx = 1000.0;
 /// Score on a coarse level from which on the level below is searched. Derivation: of a hundred true
 /// places of recorded images all but one score more there.
@@ -28,12 +28,13 @@ constexpr int kWindowPx = (2 * kReach + 1) * (2 * kReach + 1);
 constexpr int kFineWindowPx = (2 * kFineReach + 1) * (2 * kFineReach + 1);
 /// How often such a window follows its best pixel to beyond the rim.
 constexpr int kMoves = 2;
-/// Spurious matches that a search from this level on brings, over those of one that correlates every
-/// pixel. Derivation: measured on recorded images, see doc/theory/active_matching.md.
+/// Spurious matches that a search from this level on brings, over those of one that correlates
+/// every pixel. Derivation: measured on recorded images, see doc/theory/active_matching.md.
 constexpr double kClutter[] = {1.0, 0.47, 0.25};
 
 int levelOf(double pixels, int coarsest) {
-  return std::clamp(static_cast<int>(std::lround(0.5 * std::log2(pixels / kCoarsePx))), 1, coarsest);
+  return std::clamp(static_cast<int>(std::lround(0.5 * std::log2(pixels / kCoarsePx))), 1,
+                    coarsest);
 }
 
 }  // namespace
@@ -121,7 +122,8 @@ std::vector<ImageFeatureSearch::Candidate> ImageFeatureSearch::coarseMaxima(
                      std::min(high(valid.max_u), image.cols - 1 - kBorder),
                      std::min(high(valid.max_v), image.rows - 1 - kBorder)};
   added_.clear();
-  forEachEllipseRun(scaled, box, [&](const PixelRun& run) { coarse.searched.insert(run, &added_); });
+  forEachEllipseRun(scaled, box,
+                    [&](const PixelRun& run) { coarse.searched.insert(run, &added_); });
   if (added_.empty()) return {};
   correlator_.correlate(image, coarse.patch, added_, &added_scores_);
   pixels_searched_ += static_cast<std::int64_t>(added_scores_.size());

@@ -111,8 +111,7 @@ SearchOutcome ImageFeatureSearch::search(int feature_index, const SearchEllipse&
   } else {
     searchPixels(feature, ellipse, valid);
   }
-  outcome.pixels_new =
-      static_cast<int>(searchedPixels(feature_index).size() - searched_before);
+  outcome.pixels_new = static_cast<int>(searchedPixels(feature_index).size() - searched_before);
   outcome.correlations = static_cast<int>(pixels_searched_ - correlated_before);
   for (const SearchMatch& match : feature.matches)
     if (mahalanobisSquared(ellipse, match.pixel) <= kEllipseRadius2)

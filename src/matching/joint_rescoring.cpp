@@ -87,8 +87,7 @@ Mixture::Evidence Mixture::evidenceOf(const Hypothesis& h, const std::vector<int
     const SearchEllipse expected = chain.predict(f);
     if (!isProperEllipse(expected)) continue;
     const SearchMatch& found = search_.matches(f)[slot(m)];
-    const double p =
-        massOfPixel(found.pixel, expected.center, expected.covariance) / found.clutter;
+    const double p = massOfPixel(found.pixel, expected.center, expected.covariance) / found.clutter;
     evidence.log_likelihood += std::log(std::max(likelihood(f).match * p, kLeast));
     chain.condition(f, expected, found.pixel);
   }

@@ -145,8 +145,7 @@ void Tracker::Implementation::recordSearches(const FrameState& current, std::int
     if (used || pixels > 0.0)
       records.push_back({current.prior.ids[i], used,
                          static_cast<std::int64_t>(current.search.matches(i).size()),
-                         std::llround(pixels),
-                         innovation_px});
+                         std::llround(pixels), innovation_px});
   }
   map_.record(records, index);
 }

@@ -101,9 +101,8 @@ struct Tally {
 };
 
 bool hasMatchAt(const std::vector<SearchMatch>& matches, const Eigen::Vector2d& pixel) {
-  return std::any_of(matches.begin(), matches.end(), [&](const SearchMatch& m) {
-    return (m.pixel - pixel).norm() < 0.1;
-  });
+  return std::any_of(matches.begin(), matches.end(),
+                     [&](const SearchMatch& m) { return (m.pixel - pixel).norm() < 0.1; });
 }
 
 void compareSearches(const std::vector<ImagePair>& pairs, double true_area_px, double area_px,
@@ -152,11 +151,12 @@ void expectTheSameMatches(const std::string& name, const std::vector<ImagePair>&
   for (const double area_px : {6e3, 2e4, 2e5}) {
     Tally tally;
     compareSearches(pairs, true_area_px, area_px, &tally);
-    std::printf("%s, %.0f px a gate (clipped: %.0f): %d of %d places found, %d of %d spurious, "
-                "%d that no full search finds; %.0f correlations a search\n",
-                name.c_str(), area_px, tally.pixels / std::max(tally.places, 1), tally.found,
-                tally.places, tally.others_found, tally.others, tally.unknown,
-                tally.correlations / std::max(tally.places, 1));
+    std::printf(
+        "%s, %.0f px a gate (clipped: %.0f): %d of %d places found, %d of %d spurious, "
+        "%d that no full search finds; %.0f correlations a search\n",
+        name.c_str(), area_px, tally.pixels / std::max(tally.places, 1), tally.found, tally.places,
+        tally.others_found, tally.others, tally.unknown,
+        tally.correlations / std::max(tally.places, 1));
     EXPECT_GE(tally.places, 50);
     EXPECT_GE(tally.found, 0.96 * tally.places);
     EXPECT_LE(tally.unknown, 0.01 * tally.found);
@@ -172,8 +172,8 @@ TEST(CoarseToFineTest, FindsWhatAFullSearchFindsInRenderedImages) {
   expectTheSameMatches("rendered", renderedPairs(2), 3000.0);
 }
 
-class CoarseToFineRecorded : public testing::TestWithParam<std::tuple<const char*, const char*, int>> {
-};
+class CoarseToFineRecorded
+    : public testing::TestWithParam<std::tuple<const char*, const char*, int>> {};
 
 TEST_P(CoarseToFineRecorded, FindsWhatAFullSearchFinds) {
   if (!std::getenv("AMS_DATA")) GTEST_SKIP() << "skipped: AMS_DATA is not set";

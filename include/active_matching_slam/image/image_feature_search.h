@@ -17,16 +17,16 @@ namespace active_matching_slam {
 
 /// Searches features in an image by normalised cross-correlation of their templates. A match is a
 /// local maximum (3 x 3; of equal scores the first by row and column) of the score of at least
-/// `match_threshold`, refined to sub-pixel (by gradients from the paraboloid's peak, or that peak where
-/// they do not converge). A search reports the matches whose refined position
-/// lies in the ellipse. Where a maximum touches the rim of the ellipse the neighbours needed to
-/// decide it are correlated, and counted, too; a match found that way just outside is known to
-/// matches() but not reported. Score maps live as long as the frame.
+/// `match_threshold`, refined to sub-pixel (by gradients from the paraboloid's peak, or that peak
+/// where they do not converge). A search reports the matches whose refined position lies in the
+/// ellipse. Where a maximum touches the rim of the ellipse the neighbours needed to decide it are
+/// correlated, and counted, too; a match found that way just outside is known to matches() but not
+/// reported. Score maps live as long as the frame.
 ///
 /// Wide ellipses, of some thousand pixels and more, are searched coarse to fine: at the level of an
-/// image pyramid at which they have about a thousand, with templates that show more of the feature's
-/// surroundings; around what resembles these most the level below is searched, and so on. What was
-/// searched so counts as searched, though few of its pixels were correlated.
+/// image pyramid at which they have about a thousand, with templates that show more of the
+/// feature's surroundings; around what resembles these most the level below is searched, and so on.
+/// What was searched so counts as searched, though few of its pixels were correlated.
 class ImageFeatureSearch : public FeatureSearch {
  public:
   /// Throws std::invalid_argument, see checkImageOptions().
@@ -54,8 +54,8 @@ class ImageFeatureSearch : public FeatureSearch {
   const SearchMatch* bestMatch(int feature) const;
   /// Correlations made in this frame: distinct (feature, pixel) pairs.
   std::int64_t pixelsSearched() const { return pixels_searched_; }
-  /// Pixels which, correlated one by one, would bring as many spurious matches of the feature as its
-  /// searches in this frame do.
+  /// Pixels which, correlated one by one, would bring as many spurious matches of the feature as
+  /// its searches in this frame do.
   double clutterPixels(int feature) const;
 
  private:
