@@ -32,6 +32,8 @@ void checkImageOptions(const ImageOptions& o) {
           "inside (0, 1]");
   require(o.minimum_contrast >= 0.0 && o.minimum_contrast <= 128.0, "minimum_contrast",
           o.minimum_contrast, "inside [0, 128]");
+  require(o.working_width >= 160 && o.working_width <= 10000, "working_width", o.working_width,
+          "inside [160, 10000]");
   require(o.border_px >= 0 && o.border_px <= 10000, "border_px", o.border_px, "inside [0, 10000]");
 }
 

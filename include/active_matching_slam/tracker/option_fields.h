@@ -125,14 +125,18 @@ void visitOptions(Options& o, Visitor&& visit) {
         o.image.minimum_contrast, 0.0, 128.0);
   visit(F{"image/border_px", "features are not searched closer to the image border [px]", true},
         o.image.border_px, 0, 200);
+  visit(F{"image/working_width",
+          "images of more pixels than one of 4:3 of this width are tracked reduced to as many [px]",
+          false},
+        o.image.working_width, 160, 10000);
 
   visit(F{"map/features_per_frame", "features measured in a frame", true}, o.map.features_per_frame,
         4, 1000);
   visit(F{"map/maximum_features", "the map never holds more", true}, o.map.maximum_features, 4,
         5000);
-  visit(
-      F{"map/minimum_distance_px", "between a new feature and every other in the image [px]", true},
-      o.map.minimum_distance_px, 2.0, 500.0);
+  visit(F{"map/minimum_distance_px",
+          "between a new feature and every other in the image [px of an image of 640 x 480]", true},
+        o.map.minimum_distance_px, 2.0, 500.0);
   visit(F{"map/maximum_view_angle_deg", "since first sight [deg]", true},
         o.map.maximum_view_angle_deg, 1.0, 89.0);
   visit(F{"map/minimum_scale", "least change of apparent size since first sight", true},
