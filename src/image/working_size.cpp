@@ -7,6 +7,13 @@
 #include "active_matching_slam/math/pixel_scale.h"
 
 namespace active_matching_slam {
+namespace {
+
+/// From how many pixels for one on an image is smoothed first. Derivation: the middle, as a factor,
+/// between 1 and 2, where every or every other pixel would be taken.
+constexpr double kSmoothedFrom = 1.4142135623730951;
+
+}  // namespace
 
 WorkingSize::WorkingSize(const CameraCalibration& given, int working_width)
     : given_(given), working_(given), size_(given.width, given.height) {
@@ -28,17 +35,18 @@ WorkingSize::WorkingSize(const CameraCalibration& given, int working_width)
 
 cv::Mat WorkingSize::reduce(const cv::Mat& image) const {
   cv::Mat reduced = image;
-  // Halves are made fast.
-  while (reduced.cols % 2 == 0 && reduced.rows % 2 == 0 && reduced.cols >= 2 * size_.width &&
-         reduced.rows >= 2 * size_.height) {
+  while (reduced.cols >= 2 * size_.width && reduced.rows >= 2 * size_.height) {
     cv::Mat half;
     cv::resize(reduced, half, {reduced.cols / 2, reduced.rows / 2}, 0.0, 0.0, cv::INTER_AREA);
     reduced = half;
   }
   if (reduced.size() == size_) return reduced;
-  cv::Mat rest;
-  cv::resize(reduced, rest, size_, 0.0, 0.0, cv::INTER_AREA);
-  return rest;
+  // The rest is less than a half: interpolation, ten times as fast as means over parts of pixels,
+  // leaves nothing out where what it can't show is smoothed away.
+  cv::Mat rest = reduced;
+  if (rest.cols > kSmoothedFrom * size_.width) cv::GaussianBlur(reduced, rest, {3, 3}, 0.0);
+  cv::resize(rest, reduced, size_, 0.0, 0.0, cv::INTER_LINEAR);
+  return reduced;
 }
 
 Eigen::Vector2d WorkingSize::reduce(const Eigen::Vector2d& pixel) const {

@@ -20,7 +20,7 @@ class WorkingSize {
   /// Of the images tracked.
   const CameraCalibration& calibration() const { return working_; }
 
-  /// Mean of the area of each pixel. Shares the image's memory where its size is kept.
+  /// Halves, means of four pixels each, and what is left by interpolation. Shares the image's memory where its size is kept.
   cv::Mat reduce(const cv::Mat& image) const;
   /// Where a pixel of an image given lies in the reduced one: centres are whole numbers, so that
   /// the edge of either is at -0.5.
