@@ -11,12 +11,12 @@
 namespace active_matching_slam {
 
 Ekf::Ekf(const FilterOptions& options) : options_(options) {
-  checkFilterOptions(options);
+  checkFields(options);
   covariance_.reset(CameraError::kSize);
 }
 
 void Ekf::setOptions(const FilterOptions& options) {
-  checkFilterOptions(options);
+  checkFields(options);
   options_ = options;
 }
 

@@ -106,7 +106,6 @@ void Initialiser::disambiguate(const CameraModel& model, const Ekf& filter) {
 
 /// A few iterations an image, over all keyframes, until they converge.
 std::optional<InitialState> Initialiser::refine(const CameraModel& model, const Ekf& filter) {
-  is_first_in_sight_ = is_first_in_sight_ && keyframes_.sharesFirst();
   if (adjusting_images_ == 0) {
     const auto parallax = keyframes_.parallax(model);
     if (!parallax) end();

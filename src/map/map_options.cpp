@@ -1,13 +1,11 @@
 #include "active_matching_slam/map/map_options.h"
 
-#include <stdexcept>
-#include <string>
-
 namespace active_matching_slam {
 
 void checkMapOptions(const MapOptions& options) {
+  checkFields(options);
   if (options.maximum_features < options.features_per_frame)
-    throw std::invalid_argument(
+    refuseOption(
         "map/maximum_features = " + std::to_string(options.maximum_features) +
         " is less than map/features_per_frame = " + std::to_string(options.features_per_frame));
 }

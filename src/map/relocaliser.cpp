@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
-#include <stdexcept>
-#include <string>
 
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/image/warp.h"
@@ -30,31 +28,22 @@ constexpr int kMinimumSightings = 6;
 constexpr int kRansacIterations = 1000;
 /// Residual of a RANSAC inlier [px]. Cost: coarse, as ORB corners of the smallest scale are.
 constexpr float kRansacPx = 5.0f;
+/// Radius searched about where the first, coarse pose predicts a feature [px]. Cost: of the search;
+/// below the RANSAC inlier's, features that it counts would be missed.
+constexpr double kSearchRadiusPx = 8.0;
+/// A found feature's largest distance from its prediction [px]. Cost: a larger one lets a wrong
+/// pose pass, a smaller one refuses maps whose points are a little off.
+constexpr double kInlierPx = 3.0;
 /// Largest slope of a ray that is used. Derivation: a residual in ideal pixels grows with its
 /// square.
 constexpr double kMaximumSlope = 5.0;
 
-void checkRange(const char* name, double value, double low, double high) {
-  if (!(value >= low && value <= high))
-    throw std::invalid_argument("relocaliser/" + std::string(name) + " = " + std::to_string(value) +
-                                " is outside [" + std::to_string(low) + ", " +
-                                std::to_string(high) + "]");
-}
-
 }  // namespace
-
-void checkRelocaliserOptions(const RelocaliserOptions& options) {
-  checkRange("minimum_inliers", options.minimum_inliers, 6, 1000);
-  checkRange("minimum_visible_share", options.minimum_visible_share, 0.2, 1.0);
-  checkRange("maximum_depth_sigma", options.maximum_depth_sigma, 0.0, 1.0);
-  checkRange("search_radius_px", options.search_radius_px, 1.0, 50.0);
-  checkRange("inlier_px", options.inlier_px, 0.5, 10.0);
-}
 
 Relocaliser::Relocaliser(const RelocaliserOptions& options, const MapOptions& map,
                          const ImageOptions& image)
     : options_(options), map_options_(map), image_options_(image) {
-  checkRelocaliserOptions(options);
+  checkFields(options);
   checkMapOptions(map);
   checkImageOptions(image);
 }
@@ -69,20 +58,20 @@ std::optional<Relocalisation> Relocaliser::find(const CameraModel& camera, const
   if (!T_world_camera) return std::nullopt;
 
   std::vector<Sighting> found;
-  searchVisible(camera, image, landmarks, *T_world_camera, options_.search_radius_px, &found);
+  searchVisible(camera, image, landmarks, *T_world_camera, kSearchRadiusPx, &found);
   if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
   *T_world_camera = refinePose(camera, found, *T_world_camera);
 
   // The proof, with templates as the refined pose expects them.
   Relocalisation result;
   result.searched =
-      searchVisible(camera, image, landmarks, *T_world_camera, 2.0 * options_.inlier_px, &found);
+      searchVisible(camera, image, landmarks, *T_world_camera, 2.0 * kInlierPx, &found);
   if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
   result.T_world_camera = refinePose(camera, found, *T_world_camera);
   double sum = 0.0;
   for (const Sighting& sighting : found) {
     const double distance = residual(camera, sighting, result.T_world_camera);
-    if (!(distance <= options_.inlier_px)) continue;
+    if (!(distance <= kInlierPx)) continue;
     result.inliers.push_back({sighting.landmark->feature->id, sighting.pixel, 0.0});
     sum += distance * distance;
   }

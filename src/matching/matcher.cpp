@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "active_matching_slam/math/option_field.h"
 #include "baseline_matchers.h"
 #include "mixture_matchers.h"
 
@@ -21,9 +22,8 @@ std::unique_ptr<Matcher> createMatcher(const std::string& name) {
   if (name == "fast_active") return std::make_unique<FastActiveMatcher>();
   if (name == "chow_liu") return std::make_unique<ChowLiuMatcher>();
   if (name == "auto") return std::make_unique<AutoMatcher>();
-  std::string known;
-  for (const std::string& n : matcherNames()) known += (known.empty() ? "" : ", ") + n;
-  throw std::invalid_argument("matcher is '" + name + "', must be one of " + known);
+  checkChoice("matcher", name, matcherNames());
+  throw std::logic_error("a matcher is named that can't be made");
 }
 
 }  // namespace active_matching_slam

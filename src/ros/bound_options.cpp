@@ -40,14 +40,14 @@ double toNumber(const std::string& name, const OptionValue& value) {
   if (const auto* i = std::get_if<std::int64_t>(&value)) return static_cast<double>(*i);
   if (const auto* s = std::get_if<std::string>(&value); s && parseNumber(*s, &number))
     return number;
-  failType(name, "a number", value);
+  failType(name, kindOf<double>(), value);
 }
 
 std::int64_t toInteger(const std::string& name, const OptionValue& value) {
   if (const auto* i = std::get_if<std::int64_t>(&value)) return *i;
   const double number = toNumber(name, value);
   if (std::nearbyint(number) != number || std::abs(number) > 4.7e18)
-    failType(name, "a whole number", value);
+    failType(name, kindOf<std::int64_t>(), value);
   return static_cast<std::int64_t>(number);
 }
 
@@ -71,27 +71,15 @@ bool isForeign(const std::string& name) {
   return name == "diagnostic_period" || name == "num_worker_threads";
 }
 
-void checkRange(const BoundOption& option, const std::string& prefix) {
-  if (!option.isNumber()) return;
-  const OptionValue value = option.get();
-  const double number = toNumber(option.name(), value);
-  if (number >= option.minimum() && number <= option.maximum()) return;
-  std::ostringstream message;
-  message << prefix << option.name() << " = " << toText(value) << " is out of range ["
-          << option.minimum() << ", " << option.maximum() << "]";
-  throw std::invalid_argument(message.str());
+bool isInRange(const BoundOption& option, double number) {
+  return number >= option.minimum() && number <= option.maximum();
 }
 
 }  // namespace
 
 void checkNodeOptions(const NodeOptions& options) {
-  NodeOptions copy = options;
-  std::vector<BoundOption> bound;
-  visitNodeOptions(copy, Binder{&bound});
-  for (const BoundOption& option : bound) checkRange(option, "");
-  if (options.tf_mode != "camera" && options.tf_mode != "map_to_odom" && options.tf_mode != "none")
-    throw std::invalid_argument("tf_mode = '" + options.tf_mode +
-                                "' is neither camera, map_to_odom nor none");
+  checkFields(options);
+  checkChoice("tf_mode", options.tf_mode, {"camera", "map_to_odom", "none"});
   if (options.world_frame.empty()) throw std::invalid_argument("world_frame is empty");
   const std::string child = options.base_frame.empty() ? options.camera_frame : options.base_frame;
   for (const std::string& frame : {child, options.map_frame, options.camera_frame})
@@ -134,11 +122,11 @@ void BoundOption::set(const OptionValue& value) const {
         using T = std::decay_t<decltype(*target)>;
         if constexpr (std::is_same_v<T, bool>) {
           const auto* b = std::get_if<bool>(&value);
-          if (!b) failType(name(), "true or false", value);
+          if (!b) failType(name(), kindOf<T>(), value);
           *target = *b;
         } else if constexpr (std::is_same_v<T, std::string> || std::is_same_v<T, UpdateRule>) {
           const auto* text = std::get_if<std::string>(&value);
-          if (!text) failType(name(), "text", value);
+          if (!text) failType(name(), kindOf<T>(), value);
           if constexpr (std::is_same_v<T, UpdateRule>)
             *target = updateRuleFromName(*text);
           else
@@ -159,7 +147,7 @@ void BoundOption::set(const OptionValue& value) const {
 std::vector<BoundOption> bindOptions(TrackerOptions* tracker, NodeOptions* node) {
   std::vector<BoundOption> options;
   if (tracker) visitOptions(*tracker, Binder{&options});
-  if (node) visitNodeOptions(*node, Binder{&options});
+  if (node) visitOptions(*node, Binder{&options});
   return options;
 }
 
@@ -175,7 +163,10 @@ void readParameterTree(const std::vector<BoundOption>& options, XmlRpc::XmlRpcVa
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(prefix + error.what());
     }
-    checkRange(*option, prefix);
+    if (!option->isNumber()) return;
+    const OptionValue taken = option->get();
+    if (!isInRange(*option, toNumber(name, taken)))
+      refuseOption(outOfRange(prefix + name, toText(taken), option->minimum(), option->maximum()));
   };
   for (auto& [group, value] : tree) {
     if (value.getType() != XmlRpc::XmlRpcValue::TypeStruct) {
@@ -195,7 +186,7 @@ OptionValue clipToRange(const BoundOption& option, const OptionValue& value,
                         std::vector<std::string>* warnings) {
   if (!option.isNumber()) return value;
   const double number = toNumber(option.name(), value);
-  if (number >= option.minimum() && number <= option.maximum()) return value;
+  if (isInRange(option, number)) return value;
   const bool whole = std::holds_alternative<std::int64_t>(option.get());
   // Not a number compares false with everything: keep what is set.
   OptionValue clipped = option.get();
@@ -203,10 +194,8 @@ OptionValue clipToRange(const BoundOption& option, const OptionValue& value,
     const double edge = std::clamp(number, option.minimum(), option.maximum());
     clipped = whole ? OptionValue(static_cast<std::int64_t>(edge)) : OptionValue(edge);
   }
-  std::ostringstream message;
-  message << option.name() << " = " << toText(value) << " is out of range [" << option.minimum()
-          << ", " << option.maximum() << "]: set to " << toText(clipped);
-  warnings->push_back(message.str());
+  warnings->push_back(outOfRange(option.name(), toText(value), option.minimum(), option.maximum()) +
+                      ": set to " + toText(clipped));
   return clipped;
 }
 

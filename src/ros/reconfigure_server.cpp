@@ -32,10 +32,17 @@ void append(dynamic_reconfigure::Config* config, const std::string& name,
     append(&config->strs, name, std::get<std::string>(value));
 }
 
-void addDefaultGroup(dynamic_reconfigure::Config* config) {
-  dynamic_reconfigure::GroupState& group = config->groups.emplace_back();
-  group.name = "Default";
-  group.state = true;
+/// By its index, which is its id: the one that holds all others is the protocol's own.
+const char* const kGroupNames[] = {"Default", "Advanced"};
+
+void addGroups(dynamic_reconfigure::Config* config) {
+  for (const char* name : kGroupNames) {
+    const auto id = static_cast<int>(config->groups.size());
+    dynamic_reconfigure::GroupState& group = config->groups.emplace_back();
+    group.name = name;
+    group.id = id;
+    group.state = id == 0;  // advanced ones are folded
+  }
 }
 
 /// An end of the range in the type of the setting; for text and truth values what they are.
@@ -126,28 +133,34 @@ dynamic_reconfigure::Config toConfigMsg(const std::vector<BoundOption>& options)
   dynamic_reconfigure::Config config;
   for (const BoundOption& option : options)
     if (option.field().at_run_time) append(&config, option.name(), option.get());
-  addDefaultGroup(&config);
+  addGroups(&config);
   return config;
 }
 
 dynamic_reconfigure::ConfigDescription toConfigDescriptionMsg(
     const std::vector<BoundOption>& options) {
   dynamic_reconfigure::ConfigDescription description;
-  dynamic_reconfigure::Group& group = description.groups.emplace_back();
-  group.name = "Default";
+  for (const char* name : kGroupNames) {
+    dynamic_reconfigure::Group group;
+    group.name = name;
+    group.id = static_cast<int>(description.groups.size());
+    if (group.id > 0) group.type = "collapse";
+    description.groups.push_back(group);
+  }
   for (const BoundOption& option : options) {
     if (!option.field().at_run_time) continue;
-    dynamic_reconfigure::ParamDescription& parameter = group.parameters.emplace_back();
+    dynamic_reconfigure::ParamDescription& parameter =
+        description.groups[option.field().is_advanced ? 1 : 0].parameters.emplace_back();
     parameter.name = option.name();
     parameter.type = typeName(option.get());
-    parameter.description = option.field().description;
+    parameter.description = option.field().text();
     append(&description.dflt, option.name(), option.get());
     append(&description.min, option.name(), rangeEnd(option, option.minimum()));
     append(&description.max, option.name(), rangeEnd(option, option.maximum()));
   }
-  addDefaultGroup(&description.dflt);
-  addDefaultGroup(&description.min);
-  addDefaultGroup(&description.max);
+  addGroups(&description.dflt);
+  addGroups(&description.min);
+  addGroups(&description.max);
   return description;
 }
 

@@ -1,17 +1,14 @@
 #include "active_matching_slam/simulation/named_choice.h"
 
-#include <stdexcept>
+#include "active_matching_slam/math/option_field.h"
 
 namespace active_matching_slam {
 
 void checkChoice(const std::string& what, const std::string& name,
                  const std::vector<NamedChoice>& choices) {
-  std::string list;
-  for (const NamedChoice& choice : choices) {
-    if (choice.name == name) return;
-    list += (list.empty() ? "" : ", ") + choice.name;
-  }
-  throw std::invalid_argument(what + " is '" + name + "', must be one of " + list);
+  std::vector<std::string> names;
+  for (const NamedChoice& choice : choices) names.push_back(choice.name);
+  checkChoice(what, name, names);
 }
 
 }  // namespace active_matching_slam

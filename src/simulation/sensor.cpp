@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "active_matching_slam/math/option_field.h"
 #include "active_matching_slam/simulation/random.h"
-#include "check_range.h"
 
 namespace active_matching_slam {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "active_matching_slam/math/option_field.h"
 #include "active_matching_slam/simulation/random.h"
-#include "check_range.h"
 
 namespace active_matching_slam {
 namespace {

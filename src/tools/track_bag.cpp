@@ -119,7 +119,7 @@ NodeOptions drawingOf(const std::vector<std::string>& names) {
   NodeOptions options;
   for (const std::string& name : names) {
     bool known = false;
-    visitNodeOptions(options, [&](const OptionField& field, auto& value, auto...) {
+    visitOptions(options, [&](const OptionField& field, auto& value, auto...) {
       if constexpr (std::is_same_v<std::decay_t<decltype(value)>, bool>) {
         if (field.name != "draw/" + name) return;
         value = known = true;

@@ -60,10 +60,10 @@ MatchCascade::MatchCascade(const std::string& matcher, const MatchCascadeOptions
       jcbb_(createMatcher("jcbb")),
       ransac_(createMatcher("one_point_ransac")) {}
 
-void MatchCascade::setMatcher(const std::string& matcher) {
-  if (matcher == matcher_name_) return;
-  matcher_ = createMatcher(matcher);
+void MatchCascade::setOptions(const std::string& matcher, const MatchCascadeOptions& options) {
+  if (matcher != matcher_name_) matcher_ = createMatcher(matcher);
   matcher_name_ = matcher;
+  options_ = options;
 }
 
 void MatchCascade::match(const MatchOptions& matching, bool fallbacks, FrameState* frame) {

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "active_matching_slam/image/image_quality.h"
-#include "active_matching_slam/tracker/option_fields.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
@@ -54,10 +53,10 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
     throw std::invalid_argument(
         "image/template_size_px, image/source_patch_size_px and image/working_width can't change "
         "while a map is kept");
-  cascade_.setMatcher(options.matcher);
+  cascade_.setOptions(options.matcher, options.cascade);
   filter_.setOptions(withTrustIn(camera_.calibration(), options.filter));
   noise_.setOptions(options.filter);
-  relocaliser_ = Relocaliser({}, options.map, options.image);
+  relocaliser_ = Relocaliser(options.relocaliser, options.map, options.image);
   options_ = options;
 }
 

@@ -34,8 +34,8 @@ class Tracker::Implementation {
         options_(options),
         filter_(withTrustIn(camera_.calibration(), options.filter)),
         noise_(options.filter),
-        cascade_(options.matcher),
-        relocaliser_({}, options.map, options.image) {
+        cascade_(options.matcher, options.cascade),
+        relocaliser_(options.relocaliser, options.map, options.image) {
     checkTrackerOptions(options);
   }
 

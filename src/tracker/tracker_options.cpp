@@ -12,27 +12,12 @@
 
 #include "active_matching_slam/image/template.h"
 #include "active_matching_slam/matching/matcher.h"
-#include "active_matching_slam/tracker/option_fields.h"
 
 namespace active_matching_slam {
 namespace {
 
 constexpr std::size_t kFewestKnownPoints = 4;
 constexpr int kSmallestTemplate = 5;  ///< side [px], as of image/template_size_px
-
-/// Throws for every number outside its closed range (NaN included).
-struct RangeCheck {
-  template <class T>
-  void operator()(const OptionField& field, const T& value, T minimum, T maximum) const {
-    if (value >= minimum && value <= maximum) return;
-    std::ostringstream message;
-    message << field.name << " = " << value << " is out of range [" << minimum << ", " << maximum
-            << "]";
-    throw std::invalid_argument(message.str());
-  }
-  template <class T>
-  void operator()(const OptionField&, const T&) const {}
-};
 
 /// Takes what a yaml tree says and remembers which keys are known.
 struct YamlReader {
@@ -58,7 +43,7 @@ struct YamlReader {
     try {
       value = node.as<T>();
     } catch (const YAML::Exception&) {
-      throw std::invalid_argument(std::string(field.name) + " has a value of the wrong type");
+      refuseOption(std::string(field.name) + " = " + YAML::Dump(node) + " is not " + kindOf<T>());
     }
   }
   void operator()(const OptionField& field, UpdateRule& value) const {
@@ -94,29 +79,11 @@ YAML::Node loadYaml(const std::string& path) {
 
 }  // namespace
 
-std::string updateRuleName(UpdateRule rule) {
-  return rule == UpdateRule::kThesis ? "thesis" : "incremental";
-}
-
-UpdateRule updateRuleFromName(const std::string& name) {
-  if (name == "incremental") return UpdateRule::kIncremental;
-  if (name == "thesis") return UpdateRule::kThesis;
-  throw std::invalid_argument("matching/update_rule = '" + name +
-                              "' is neither incremental nor thesis");
-}
-
 void checkTrackerOptions(const TrackerOptions& options) {
-  visitOptions(options, RangeCheck{});
-  const auto& names = matcherNames();
-  if (std::find(names.begin(), names.end(), options.matcher) == names.end()) {
-    std::string message = "matcher = '" + options.matcher + "' is unknown; there are:";
-    for (const auto& name : names) message += " " + name;
-    throw std::invalid_argument(message);
-  }
-  checkFilterOptions(options.filter);
+  checkFields(options);
+  checkChoice("matcher", options.matcher, matcherNames());
   checkImageOptions(options.image);
   checkMapOptions(options.map);
-  checkMatchOptions(options.matching);
   if (!options.known_points.empty() && options.known_points.size() < kFewestKnownPoints)
     throw std::invalid_argument("known points: " + std::to_string(options.known_points.size()) +
                                 " given, a start needs at least " +

@@ -59,6 +59,7 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
     for (const FeatureState& feature : filter_.features())
       if (const auto projection = projectFeature(camera_, filter_.camera(), feature))
         first.push_back({feature.id, projection->pixel, 0.0});
+    initialiser_ = Initialiser(options_.initialisation);
     initialiser_.begin({frame->index, last_stamp_s_, first});
   }
   if (map_.size() < std::max(4, options_.minimum_matches)) {

@@ -141,7 +141,7 @@ TEST(Relocaliser, SaysNothingOfAnEmptyMapOrABlankOrForeignImage) {
 TEST(Relocaliser, RefusesSettingsOutOfRange) {
   RelocaliserOptions options;
   options.minimum_inliers = 3;
-  EXPECT_THROW(checkRelocaliserOptions(options), std::invalid_argument);
+  EXPECT_THROW(Relocaliser(options, {}, {}), std::invalid_argument);
 }
 
 }  // namespace

@@ -334,16 +334,10 @@ TEST(CreateMatcher, RefusesAnUnknownNameAndListsTheKnownOnes) {
   }
 }
 
-TEST(CheckMatchOptions, NamesWhatIsOutOfRange) {
-  EXPECT_NO_THROW(checkMatchOptions({}));
-  MatchOptions options;
-  options.prune_weight = 1.0;
-  try {
-    checkMatchOptions(options);
-    FAIL() << "prune_weight 1 was accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("prune_weight"), std::string::npos);
-  }
+TEST(UpdateRules, HaveNamesAndNoOthers) {
+  for (const UpdateRule rule : {UpdateRule::kIncremental, UpdateRule::kThesis})
+    EXPECT_EQ(updateRuleFromName(updateRuleName(rule)), rule);
+  EXPECT_THROW(updateRuleFromName("mine"), std::invalid_argument);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -111,13 +112,21 @@ TEST(RunTimeChanges, AreClippedToTheirRangeWithAWarningThatNamesThem) {
 TEST(RunTimeChanges, DescriptionHoldsTheLiveSettingsWithTheirRanges) {
   Settings settings;
   const auto description = toConfigDescriptionMsg(settings.bound);
-  ASSERT_EQ(1u, description.groups.size());
   bool has_matcher = false;
-  for (const auto& parameter : description.groups[0].parameters) {
-    has_matcher |= parameter.name == "matcher" && parameter.type == "str";
-    EXPECT_TRUE(settings.option(parameter.name).field().at_run_time) << parameter.name;
-  }
+  std::size_t described = 0;
+  for (const auto& group : description.groups)
+    for (const auto& parameter : group.parameters) {
+      ++described;
+      has_matcher |= parameter.name == "matcher" && parameter.type == "str";
+      const OptionField& field = settings.option(parameter.name).field();
+      EXPECT_TRUE(field.at_run_time) << parameter.name;
+      EXPECT_EQ(group.name == "Advanced", field.is_advanced) << parameter.name;
+      EXPECT_EQ(parameter.description, field.text());
+    }
   EXPECT_TRUE(has_matcher);
+  const auto live = [](const BoundOption& option) { return option.field().at_run_time; };
+  EXPECT_EQ(described, static_cast<std::size_t>(
+                           std::count_if(settings.bound.begin(), settings.bound.end(), live)));
   for (const auto& entry : description.max.doubles)
     EXPECT_EQ(settings.option(entry.name).maximum(), entry.value) << entry.name;
   for (const auto& entry : description.dflt.doubles)

@@ -143,7 +143,7 @@ TEST(Motions, AnUnknownNameIsRefusedWithTheList) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(
         error.what(),
-        "motion is 'sprint', must be one of slow, jerky, sideways, forward, sweep, circle, still, "
+        "motion = 'sprint' is not one of slow, jerky, sideways, forward, sweep, circle, still, "
         "shake");
   }
 }

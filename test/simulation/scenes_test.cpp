@@ -62,7 +62,7 @@ TEST(Scenes, AnUnknownNameIsRefusedWithTheList) {
     FAIL() << "no exception";
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
-                 "scene is 'moon', must be one of room, office, walkway, desk, checkerboard, "
+                 "scene = 'moon' is not one of room, office, walkway, desk, checkerboard, "
                  "two_depths, corridor, corridor_end, wall");
   }
 }

@@ -70,8 +70,8 @@ TEST(Sensor, RefusesValuesOutOfRangeByName) {
     }
     return std::string();
   };
-  EXPECT_EQ(message(-1.0, 0.0), "noise is -1, must be in [0, 50]");
-  EXPECT_EQ(message(1.0, 2.0), "vignetting is 2, must be in [0, 0.9]");
+  EXPECT_EQ(message(-1.0, 0.0), "noise = -1 is out of range [0, 50]");
+  EXPECT_EQ(message(1.0, 2.0), "vignetting = 2 is out of range [0, 0.9]");
   EXPECT_NE(message(std::nan(""), 0.0), "");
 }
 

@@ -160,20 +160,20 @@ TEST(Simulator, RefusesEveryBadOptionByName) {
     return std::string("no exception");
   };
   using O = SimulatorOptions;
-  EXPECT_EQ(message([](O& o) { o.width = 10; }), "width is 10, must be in [64, 4096]");
-  EXPECT_EQ(message([](O& o) { o.height = 9999; }), "height is 9999, must be in [64, 4096]");
-  EXPECT_EQ(message([](O& o) { o.rate_hz = 0.0; }), "rate_hz is 0, must be in [0.1, 1000]");
-  EXPECT_EQ(message([](O& o) { o.duration_s = -1; }), "duration_s is -1, must be in [0, 36000]");
-  EXPECT_EQ(message([](O& o) { o.exposure_ms = 500; }), "exposure_ms is 500, must be in [0, 100]");
-  EXPECT_EQ(message([](O& o) { o.noise = NAN; }), "noise is nan, must be in [0, 50]");
-  EXPECT_EQ(message([](O& o) { o.vignetting = 1; }), "vignetting is 1, must be in [0, 0.9]");
-  EXPECT_EQ(message([](O& o) { o.drift = 2; }), "drift is 2, must be in [0, 0.9]");
-  EXPECT_EQ(message([](O& o) { o.readout_ms = -3; }), "readout_ms is -3, must be in [0, 100]");
-  EXPECT_EQ(
-      message([](O& o) { o.distortion = "fov"; }),
-      "distortion is 'fov', must be one of none, plumb_bob, rational_polynomial, equidistant");
-  EXPECT_NE(message([](O& o) { o.scene = "moon"; }).find("scene is 'moon'"), std::string::npos);
-  EXPECT_NE(message([](O& o) { o.motion = "fly"; }).find("motion is 'fly'"), std::string::npos);
+  EXPECT_EQ(message([](O& o) { o.width = 10; }), "width = 10 is out of range [64, 4096]");
+  EXPECT_EQ(message([](O& o) { o.height = 9999; }), "height = 9999 is out of range [64, 4096]");
+  EXPECT_EQ(message([](O& o) { o.rate_hz = 0.0; }), "rate_hz = 0 is out of range [0.1, 1000]");
+  EXPECT_EQ(message([](O& o) { o.duration_s = -1; }), "duration_s = -1 is out of range [0, 36000]");
+  EXPECT_EQ(message([](O& o) { o.exposure_ms = 500; }),
+            "exposure_ms = 500 is out of range [0, 100]");
+  EXPECT_EQ(message([](O& o) { o.noise = NAN; }), "noise = nan is out of range [0, 50]");
+  EXPECT_EQ(message([](O& o) { o.vignetting = 1; }), "vignetting = 1 is out of range [0, 0.9]");
+  EXPECT_EQ(message([](O& o) { o.drift = 2; }), "drift = 2 is out of range [0, 0.9]");
+  EXPECT_EQ(message([](O& o) { o.readout_ms = -3; }), "readout_ms = -3 is out of range [0, 100]");
+  EXPECT_EQ(message([](O& o) { o.distortion = "fov"; }),
+            "distortion = 'fov' is not one of none, plumb_bob, rational_polynomial, equidistant");
+  EXPECT_NE(message([](O& o) { o.scene = "moon"; }).find("scene = 'moon'"), std::string::npos);
+  EXPECT_NE(message([](O& o) { o.motion = "fly"; }).find("motion = 'fly'"), std::string::npos);
 }
 
 TEST(Simulator, EveryLensSeesAWholeImage) {

@@ -140,7 +140,7 @@ TEST(MatchCascade, BudgetGrowsWithTheIntervalAndHoldsForAllAttempts) {
 TEST(MatchCascade, UnknownMatcherIsRefused) {
   EXPECT_THROW(MatchCascade("nearest"), std::invalid_argument);
   MatchCascade cascade("active");
-  EXPECT_THROW(cascade.setMatcher("nearest"), std::invalid_argument);
+  EXPECT_THROW(cascade.setOptions("nearest", {}), std::invalid_argument);
 }
 
 TEST(MatchCascade, NothingPredictedIsNothingMatched) {

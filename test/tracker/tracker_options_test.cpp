@@ -10,8 +10,6 @@
 #include <sstream>
 #include <type_traits>
 
-#include "active_matching_slam/tracker/option_fields.h"
-
 namespace active_matching_slam {
 namespace {
 
@@ -183,6 +181,38 @@ TEST(TrackerOptions, NanIsRefusedByName) {
     }
     expectNames(messageOf<std::invalid_argument>([&] { checkTrackerOptions(options); }), name);
   }
+}
+
+/// What the end of a name says of the unit.
+TEST(TrackerOptions, UnitsAreThoseOfTheNames) {
+  const std::pair<const char*, const char*> kEnds[] = {
+      {"_px", "px"},          {"_m", "m"},        {"_s", "s"},
+      {"_deg", "deg"},        {"_bits", "bit"},   {"_mps", "m/s"},
+      {"_rps", "rad/s"},      {"_mps2", "m/s^2"}, {"_rps2", "rad/s^2"},
+      {"milliseconds", "ms"}, {"_pixels", "px"}};
+  const TrackerOptions options;
+  int with_unit = 0;
+  const auto end_of = [](const std::string& name, const std::string& end) {
+    return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+  };
+  visitOptions(options, [&](const OptionField& field, const auto&...) {
+    EXPECT_NE(std::string(field.meaning), "") << field.name;
+    for (const auto& [end, unit] : kEnds)
+      if (end_of(field.name, end)) {
+        EXPECT_STREQ(field.unit, unit) << field.name;
+        ++with_unit;
+      }
+  });
+  EXPECT_GT(with_unit, 20);
+}
+
+TEST(TrackerOptions, AdvancedOnesAreKeptApartFromFewThatManyNeed) {
+  const TrackerOptions options;
+  int basic = 0, advanced = 0;
+  visitOptions(options, [&](const OptionField& field, const auto&...) {
+    ++(field.is_advanced ? advanced : basic);
+  });
+  EXPECT_LT(basic, advanced);
 }
 
 TEST(TrackerOptions, UnknownSettingsAreNamed) {

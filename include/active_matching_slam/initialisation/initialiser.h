@@ -60,8 +60,6 @@ class Initialiser {
   bool isDone() const { return state_ == InitialiserState::kDone; }
   /// Until the first commit: the filter's depths are a guess.
   bool areDepthsGuessed() const { return !isDone() && committed_.empty(); }
-  /// All that is seen has been seen from about the same place.
-  bool isFirstInSight() const { return !isDone() && is_first_in_sight_; }
   /// Whether the feature took part in the last commit, and will in the next.
   bool isAdjusting(FeatureId id) const {
     return !isDone() && std::binary_search(committed_.begin(), committed_.end(), id);
@@ -103,7 +101,7 @@ class Initialiser {
   double last_parallax_ = 0.0;  ///< when last tested or adjusted
   int images_ = 0, last_images_ = 0;
   int adjusting_images_ = 0;  ///< that the adjustment in hand has taken; 0: none is
-  bool is_last_added_ = false, is_first_in_sight_ = true, is_first_unrelated_ = false;
+  bool is_last_added_ = false, is_first_unrelated_ = false;
 };
 
 }  // namespace active_matching_slam

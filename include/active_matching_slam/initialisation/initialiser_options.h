@@ -2,6 +2,8 @@
 
 #include <cstddef>
 
+#include "active_matching_slam/math/option_field.h"
+
 namespace active_matching_slam {
 
 /// Settings of the Initialiser. Angles are of rays, so that none depends on the image's size;
@@ -44,6 +46,26 @@ struct InitialiserOptions {
   /// Cost: Levenberg-Marquardt iterations an image, times keyframes, and images that one adjustment
   /// may take.
   int keyframe_iterations = 80, images_per_adjustment = 3;
+
+  /// Of those that users set.
+  template <class Self, class Visitor>
+  static void visitFields(Self& o, Visitor&& visit);
 };
+
+template <class Self, class Visitor>
+void InitialiserOptions::visitFields(Self& o, Visitor&& visit) {
+  visit(advancedOption("initialisation/last_parallax_deg", "deg",
+                       "how far the camera must have moved, as an angle seen from the scene, until "
+                       "the map is adjusted no more as a whole; from the next start on"),
+        o.last_parallax_deg, 0.5, 20.0);
+  visit(advancedOption("initialisation/log_odds", "nat",
+                       "how sure it must be which motion of the camera explains the first images: "
+                       "log odds against every other; from the next start on"),
+        o.log_odds, 1.0, 50.0);
+  visit(advancedOption("initialisation/correlation_inflation", "",
+                       "how much larger variances are, as errors of a point in the image persist "
+                       "from one to the next; 1: they are independent; from the next start on"),
+        o.correlation_inflation, 1.0, 100.0);
+}
 
 }  // namespace active_matching_slam

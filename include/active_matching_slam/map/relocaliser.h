@@ -10,20 +10,9 @@
 #include "active_matching_slam/filter/ekf.h"
 #include "active_matching_slam/image/image_options.h"
 #include "active_matching_slam/map/feature_map.h"
+#include "active_matching_slam/map/relocaliser_options.h"
 
 namespace active_matching_slam {
-
-struct RelocaliserOptions {
-  int minimum_inliers = 10;  ///< features that must be found where they should be
-  double minimum_visible_share =
-      0.5;                            ///< of the features that should be seen and could be searched
-  double maximum_depth_sigma = 0.25;  ///< relative: features of vaguer depth are not used
-  double search_radius_px = 8.0;      ///< around the features as the first pose predicts them
-  double inlier_px = 3.0;             ///< a found feature's largest distance from prediction
-};
-
-/// Throws std::invalid_argument with name, value and range.
-void checkRelocaliserOptions(const RelocaliserOptions& options);
 
 struct Relocalisation {
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
@@ -38,7 +27,7 @@ struct Relocalisation {
 /// match there by their warped templates. Deterministic. The map is used as if it were certain.
 class Relocaliser {
  public:
-  /// Throws as the check functions.
+  /// Throws for options out of range.
   Relocaliser(const RelocaliserOptions& options, const MapOptions& map, const ImageOptions& image);
 
   /// `camera`: with its lens as known by now. `image`: 8-bit grey of the camera's size. Empty when

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 
 #include "active_matching_slam/matching/measurement_prior.h"
+#include "active_matching_slam/math/option_field.h"
 
 namespace active_matching_slam {
 
@@ -12,6 +14,10 @@ enum class UpdateRule {
   kIncremental,  ///< every pixel counted once; weights are probabilities
   kThesis        ///< Chli 2009, eq. 5.10
 };
+
+std::string updateRuleName(UpdateRule rule);
+/// Throws std::invalid_argument for a name other than incremental and thesis.
+UpdateRule updateRuleFromName(const std::string& name);
 
 /// Settings of the matchers. Each states which matchers read it.
 struct MatchOptions {
@@ -70,12 +76,93 @@ struct MatchOptions {
   int ransac_max_hypotheses = 0;       ///< 0: every feature in turn (exhaustive, deterministic)
 
   bool keep_trace = false;  ///< record every step in MatchResult::trace
+
+  /// Of those that users set.
+  template <class Self, class Visitor>
+  static void visitFields(Self& o, Visitor&& visit);
 };
+
+template <class Self, class Visitor>
+void MatchOptions::visitFields(Self& o, Visitor&& visit) {
+  visit(basicOption("matching/max_milliseconds", "ms",
+                    "time for matching a frame at 30 Hz, more in proportion at lower rates; 0: no "
+                    "limit. A node goes by the clock, track_bag by a model of the work, which "
+                    "repeats bit for bit"),
+        o.max_milliseconds, 0.0, 1e6);
+  visit(
+      basicOption("matching/max_pixels", "px", "distinct pixels searched in a frame; 0: no limit"),
+      o.max_pixels, std::int64_t{0}, std::int64_t{1} << 40);
+  visit(advancedOption("matching/true_positive_rate", "",
+                       "probability of a match where a feature is (Ptp)"),
+        o.default_rates.true_positive, 0.01, 0.9999);
+  visit(advancedOption("matching/false_positive_rate", "",
+                       "probability of a spurious match per pixel (Pfp)"),
+        o.default_rates.false_positive, 1e-9, 0.1);
+  visit(advancedOption("matching/update_rule", "",
+                       "incremental (weights are probabilities) or thesis"),
+        o.update_rule);
+  visit(advancedOption("matching/prune_weight", "",
+                       "hypotheses (Gaussians) that are less probable are dropped"),
+        o.prune_weight, 0.0, 0.5);
+  visit(advancedOption("matching/joint_rescoring", "",
+                       "at the end re-score all hypotheses by the joint evidence of their matches, "
+                       "dropped ones too"),
+        o.joint_rescoring);
+  visit(advancedOption("matching/deferred_pruning_weight", "",
+                       "a hypothesis that was once so probable is not dropped before it was "
+                       "searched itself; 0: it is"),
+        o.deferred_pruning_weight, 0.0, 1.0);
+  visit(advancedOption("matching/k_best", "",
+                       "alternatives searched to completion when the accepted hypothesis has too "
+                       "many missed detections; needs joint_rescoring"),
+        o.k_best, 0, 100);
+  visit(advancedOption("matching/max_gaussians", "", "hypotheses kept at most; 0: no cap"),
+        o.max_gaussians, 0, 100000);
+  visit(advancedOption("matching/merge_sigmas", "sigma",
+                       "hypotheses that differ in one match, and in their predictions by less than "
+                       "this, merge; 0: never"),
+        o.merge_sigmas, 0.0, 10.0);
+  visit(advancedOption("matching/merge_probability", "",
+                       "a match that such a merge has chosen between is accepted from this "
+                       "probability on"),
+        o.merge_probability, 0.0, 1.0);
+  visit(advancedOption("matching/latch_information_bits", "bit",
+                       "when no search promises more, what is left is searched without asking "
+                       "again; 0: never"),
+        o.latch_information_bits, 0.0, 1e3);
+  visit(advancedOption("matching/ambiguous_below_weight", "",
+                       "a frame whose best hypothesis is less probable is ambiguous; 0: never"),
+        o.ambiguous_below_weight, 0.0, 1.0);
+  visit(
+      advancedOption("matching/fast_candidates", "", "fast_active: candidates evaluated in a step"),
+      o.fast_candidates, 1, 100000);
+  visit(advancedOption("matching/fast_latch_bits", "bit",
+                       "fast_active: largest gain under which it latches"),
+        o.fast_latch_bits, 0.0, 1e3);
+  visit(advancedOption("matching/fast_accept_weight", "",
+                       "fast_active: probability at which a hypothesis is taken"),
+        o.fast_accept_weight, 0.0, 1.0);
+  visit(advancedOption("matching/seed", "", "of fast_active and one_point_ransac"), o.seed,
+        std::uint64_t{0}, std::uint64_t{1} << 62);
+  visit(
+      advancedOption("matching/jcbb_max_nodes", "", "jcbb: nodes visited in a frame; 0: no limit"),
+      o.jcbb_max_nodes, std::int64_t{0}, std::int64_t{1} << 40);
+  visit(advancedOption("matching/jcbb_confidence", "",
+                       "jcbb: chi-square level of joint compatibility"),
+        o.jcbb_confidence, 0.5, 0.9999);
+  visit(advancedOption("matching/ransac_inlier_chi2", "",
+                       "one_point_ransac: squared residual of a low-innovation inlier, in units of "
+                       "the noise"),
+        o.ransac_inlier_chi2, 0.1, 100.0);
+  visit(advancedOption("matching/ransac_rescue_chi2", "",
+                       "one_point_ransac: gate of a high-innovation inlier"),
+        o.ransac_rescue_chi2, 0.1, 100.0);
+  visit(advancedOption("matching/ransac_max_hypotheses", "",
+                       "one_point_ransac: features that motions are drawn from; 0: each in turn"),
+        o.ransac_max_hypotheses, 0, 100000);
+}
 
 /// Fraction of the frame's tightest budget that this cost uses up; 0 without a budget.
 double fractionOfBudget(const MatchOptions& options, std::int64_t pixels, double milliseconds);
-
-/// Throws std::invalid_argument with name, value and allowed range.
-void checkMatchOptions(const MatchOptions& options);
 
 }  // namespace active_matching_slam

@@ -5,8 +5,9 @@
 #include <variant>
 #include <vector>
 
+#include "active_matching_slam/math/option_field.h"
 #include "active_matching_slam/ros/node_options.h"
-#include "active_matching_slam/tracker/option_fields.h"
+#include "active_matching_slam/tracker/tracker_options.h"
 
 namespace XmlRpc {
 class XmlRpcValue;

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "active_matching_slam/tracker/option_fields.h"
+#include "active_matching_slam/math/option_field.h"
 #include "active_matching_slam/visualisation/draw_options.h"
 
 namespace active_matching_slam {
@@ -26,78 +26,64 @@ struct NodeOptions {
   int trajectory_length = 200000;
   int submap_level = 2;
   DrawOptions draw;
+
+  template <class Self, class Visitor>
+  static void visitFields(Self& o, Visitor&& visit);
 };
 
-/// As visitOptions(): the single description of these settings.
-template <class Options, class Visitor>
-void visitNodeOptions(Options& o, Visitor&& visit) {
-  using F = OptionField;
-  visit(F{"image_transport", "raw, compressed, theora or any other installed", false},
+template <class Self, class Visitor>
+void NodeOptions::visitFields(Self& o, Visitor&& visit) {
+  visit(basicOption("image_transport", "", "raw, compressed, theora or any other installed")
+            .atStartOnly(),
         o.image_transport);
-  visit(F{"camera_info_url", "calibration used until a camera_info arrives (file:// or package://)",
-          false},
+  visit(basicOption("camera_info_url", "",
+                    "calibration used until a camera_info arrives (file:// or package://)")
+            .atStartOnly(),
         o.camera_info_url);
-  visit(F{"known_target",
-          "yaml file with points of known position to start from; empty: scale free", false},
+  visit(basicOption("known_target", "",
+                    "yaml file with points of known position to start from; empty: scale free")
+            .atStartOnly(),
         o.known_target);
-  visit(F{"data_directory", "where maps and trajectories live; empty: ~/.ros/active_matching_slam",
-          false},
+  visit(basicOption("data_directory", "",
+                    "where maps and trajectories live; empty: ~/.ros/active_matching_slam")
+            .atStartOnly(),
         o.data_directory);
-  visit(F{"tf_mode", "camera (world to camera), map_to_odom (REP 105) or none", false}, o.tf_mode);
-  visit(F{"world_frame", "frame of the map of features", false}, o.world_frame);
-  visit(F{"camera_frame", "optical frame of the camera; empty: what the images say", false},
+  visit(basicOption("tf_mode", "", "camera (world to camera), map_to_odom (REP 105) or none")
+            .atStartOnly(),
+        o.tf_mode);
+  visit(basicOption("world_frame", "", "frame of the map of features").atStartOnly(),
+        o.world_frame);
+  visit(basicOption("camera_frame", "", "optical frame of the camera; empty: what the images say")
+            .atStartOnly(),
         o.camera_frame);
-  visit(F{"base_frame",
-          "body frame whose pose tf and ~odometry give, found through tf; empty: the "
-          "camera's own",
-          false},
+  visit(basicOption("base_frame", "",
+                    "body frame whose pose tf and ~odometry give, found through tf; empty: the "
+                    "camera's own")
+            .atStartOnly(),
         o.base_frame);
-  visit(F{"odom_frame", "tf_mode map_to_odom: child of the transform sent", false}, o.odom_frame);
-  visit(F{"map_frame",
-          "frame with z up (REP 103) above world_frame, by a static transform; empty: "
-          "none. tf_mode map_to_odom needs it",
-          false},
+  visit(basicOption("odom_frame", "", "tf_mode map_to_odom: child of the transform sent")
+            .atStartOnly(),
+        o.odom_frame);
+  visit(basicOption("map_frame", "",
+                    "frame with z up (REP 103) above world_frame, by a static transform; empty: "
+                    "none. tf_mode map_to_odom needs it")
+            .atStartOnly(),
         o.map_frame);
-  visit(F{"transform_tolerance_s", "how far map_to_odom is dated ahead [s]", true},
-        o.transform_tolerance_s, 0.0, 10.0);
-  visit(F{"tf_timeout_s", "longest wait for the robot's own transforms [s]", true}, o.tf_timeout_s,
-        0.0, 5.0);
-  visit(F{"no_image_timeout_s", "silence after which missing images are reported [s]", true},
+  visit(basicOption("no_image_timeout_s", "s", "silence after which missing images are reported"),
         o.no_image_timeout_s, 0.5, 3600.0);
-  visit(F{"path_length", "poses in ~path", true}, o.path_length, 1, 100000);
-  visit(F{"trajectory_length", "poses kept for ~save_trajectory", false}, o.trajectory_length, 1,
-        10000000);
-  visit(F{"submap_level", "level of the hierarchy that colours map and markers", true},
+  visit(basicOption("path_length", "", "poses in ~path"), o.path_length, 1, 100000);
+  visit(basicOption("submap_level", "", "level of the hierarchy that colours map and markers"),
         o.submap_level, 0, 30);
-  visit(F{"draw/predictions", "predicted 3-sigma ellipses in ~debug_image", true},
-        o.draw.predictions);
-  visit(F{"draw/searches", "searched ellipses in ~debug_image, coloured first to last", true},
-        o.draw.searches);
-  visit(F{"draw/matches", "matches, accepted and not, and searches that found nothing", true},
-        o.draw.matches);
-  visit(F{"draw/templates", "the features' patches at the lower border", true}, o.draw.templates);
-  visit(F{"draw/information", "mutual information beside each candidate [bit]", true},
-        o.draw.information);
-  visit(F{"draw/tree", "links of the Chow-Liu tree in ~debug_image", true}, o.draw.tree);
-  visit(
-      F{"draw/links", "links of mutual information between visible features in ~debug_image", true},
-      o.draw.links);
-  visit(
-      F{"draw/submaps", "features and tree in the colours of their submaps in ~debug_image", true},
-      o.draw.submaps);
-  visit(F{"draw/status", "a line of text below ~debug_image", true}, o.draw.status);
-  visit(F{"draw/legend", "what the marks mean, below ~debug_image", true}, o.draw.legend);
-  visit(F{"draw/frustum_m", "length of the camera's frustum in ~markers/camera [m]", true},
-        o.draw.frustum_m, 1e-3, 1e3);
-  visit(F{"draw/minimum_link_bits",
-          "weaker links are left out of ~markers/mutual_information and ~debug_image [bit]", true},
-        o.draw.minimum_link_bits, 0.0, 100.0);
-  visit(F{"draw/links_per_feature",
-          "largest number of links shown of each feature, the strongest; the tree's besides", true},
-        o.draw.links_per_feature, 0, 10000);
+  visit(advancedOption("trajectory_length", "", "poses kept for ~save_trajectory").atStartOnly(),
+        o.trajectory_length, 1, 10000000);
+  visit(advancedOption("transform_tolerance_s", "s", "how far map_to_odom is dated ahead"),
+        o.transform_tolerance_s, 0.0, 10.0);
+  visit(advancedOption("tf_timeout_s", "s", "longest wait for the robot's own transforms"),
+        o.tf_timeout_s, 0.0, 5.0);
+  visitOptions(o.draw, visit);
 }
 
-/// Throws std::invalid_argument naming the setting: ranges, tf_mode, frames that are equal or
+/// Throws std::invalid_argument naming the option: ranges, tf_mode, frames that are equal or
 /// missing.
 void checkNodeOptions(const NodeOptions& options);
 

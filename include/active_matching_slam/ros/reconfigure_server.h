@@ -14,7 +14,8 @@
 namespace active_matching_slam {
 
 /// The dynamic_reconfigure protocol (as rqt_reconfigure and dynparam speak it) for the settings
-/// that may change at run time, described by the option fields alone.
+/// that may change at run time, described by the option fields alone; advanced ones are a group of
+/// their own.
 ///
 /// Publishes ~parameter_descriptions and ~parameter_updates (latched); serves ~set_parameters.
 class ReconfigureServer {

@@ -34,7 +34,7 @@ NodeSettings readNodeSettings(const ros::NodeHandle& private_node);
 ///
 /// Subscribes to `image` (image_transport) and the camera_info beside it; publishes what
 /// FramePublisher, PoseBroadcaster, NodeDiagnostics and ReconfigureServer say; serves ~reset,
-/// ~save_map, ~load_map, ~save_trajectory, ~set_scale, ~set_matcher. Parameters: option_fields.h
+/// ~save_map, ~load_map, ~save_trajectory, ~set_scale, ~set_matcher. Parameters: option_field.h
 /// and node_options.h.
 ///
 /// Callbacks must come one at a time; tracking runs in a thread of its own, on the newest image.

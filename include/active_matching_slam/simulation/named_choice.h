@@ -11,7 +11,7 @@ struct NamedChoice {
   std::string description;
 };
 
-/// Throws std::invalid_argument "<what> is '<name>', must be one of a, b, c" unless it is listed.
+/// Throws std::invalid_argument "<what> = '<name>' is not one of a, b, c" unless it is listed.
 void checkChoice(const std::string& what, const std::string& name,
                  const std::vector<NamedChoice>& choices);
 

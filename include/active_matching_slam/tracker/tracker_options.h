@@ -7,8 +7,12 @@
 
 #include "active_matching_slam/filter/filter_options.h"
 #include "active_matching_slam/image/image_options.h"
+#include "active_matching_slam/initialisation/initialiser_options.h"
 #include "active_matching_slam/map/map_options.h"
+#include "active_matching_slam/map/relocaliser_options.h"
 #include "active_matching_slam/matching/match_options.h"
+#include "active_matching_slam/math/option_field.h"
+#include "active_matching_slam/tracker/match_cascade_options.h"
 
 namespace active_matching_slam {
 
@@ -40,6 +44,9 @@ struct TrackerOptions {
   ImageOptions image;
   MapOptions map;
   MatchOptions matching = liveMatchOptions();
+  MatchCascadeOptions cascade;
+  InitialiserOptions initialisation;
+  RelocaliserOptions relocaliser;
   std::vector<KnownPoint> known_points;  ///< empty: scale free, world = first camera frame
   double known_points_search_px = 15.0;  ///< how far each may lie from its image_px
   double known_points_sigma_m = 5e-4;    ///< of their positions, per axis
@@ -54,9 +61,63 @@ struct TrackerOptions {
   /// regions allow for jerks too, and a jerk turns: that moves near and far alike, and hides the
   /// differences between them.)
   Accelerations structure_accelerations = {4.0, 3.0};
+
+  /// Its own options, and after them those of the rooms below.
+  template <class Self, class Visitor>
+  static void visitFields(Self& o, Visitor&& visit);
 };
 
-/// Throws std::invalid_argument with name, value and allowed range.
+template <class Self, class Visitor>
+void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
+  visit(basicOption("matcher", "",
+                    "active_search, jcbb, one_point_ransac, active, fast_active, chow_liu or auto"),
+        o.matcher);
+  visit(basicOption("fallback_matchers", "",
+                    "when far fewer match than should, match again by the motion of the whole "
+                    "image, jcbb, one_point_ransac"),
+        o.fallback_matchers);
+  visit(basicOption("structure", "", "maintain the graph of mutual information and the submaps"),
+        o.structure);
+  visit(
+      basicOption("known_points_search_px", "px", "how far a known point may lie from its image_px")
+          .atStartOnly(),
+      o.known_points_search_px, 1.0, 200.0);
+  visit(basicOption("known_points_sigma_m", "m",
+                    "accuracy of the known points' positions, standard deviation per axis")
+            .atStartOnly(),
+        o.known_points_sigma_m, 1e-6, 1.0);
+  visit(basicOption("lost_after_frames", "",
+                    "frames with too few matches in a row until the camera is lost"),
+        o.lost_after_frames, 1, 10000);
+  visit(basicOption("reset_when_lost_after_s", "s",
+                    "start anew when lost for so long; 0: keep looking"),
+        o.reset_when_lost_after_s, 0.0, 1e6);
+  visit(advancedOption("minimum_matches", "", "fewer matches in a frame are too few"),
+        o.minimum_matches, 1, 1000);
+  visit(advancedOption("max_frame_interval_s", "s",
+                       "after a longer gap between stamps the whole image is searched for the map "
+                       "first"),
+        o.max_frame_interval_s, 0.01, 3600.0);
+  visit(advancedOption("learn_rates", "",
+                       "learn how often each feature is matched rightly and wrongly"),
+        o.learn_rates);
+  visit(advancedOption("structure_acceleration_mps2", "m/s^2",
+                       "what the graph of mutual information expects of the camera: linear "
+                       "acceleration, standard deviation per axis"),
+        o.structure_accelerations.linear_mps2, 0.0, 1e3);
+  visit(advancedOption("structure_angular_acceleration_rps2", "rad/s^2",
+                       "the same, angular; the less, the more near and far come apart"),
+        o.structure_accelerations.angular_rps2, 0.0, 1e3);
+  visitOptions(o.filter, visit);
+  visitOptions(o.image, visit);
+  visitOptions(o.map, visit);
+  visitOptions(o.matching, visit);
+  visitOptions(o.cascade, visit);
+  visitOptions(o.initialisation, visit);
+  visitOptions(o.relocaliser, visit);
+}
+
+/// Throws std::invalid_argument with name, value and what is allowed.
 void checkTrackerOptions(const TrackerOptions& options);
 
 /// Reads known_target.yaml: points: [{position_m: [x, y, z], image_px: [u, v], template:
