@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "active_matching_slam/image/working_size.h"
 #include "active_matching_slam/information/map_structure.h"
 #include "active_matching_slam/initialisation/initialiser.h"
 #include "active_matching_slam/map/feature_map.h"
@@ -28,9 +29,10 @@ constexpr int kRelocalisationPeriodFrames = 4;
 class Tracker::Implementation {
  public:
   Implementation(const CameraModel& camera, const TrackerOptions& options)
-      : camera_(camera),
+      : working_(camera.calibration(), options.image.working_width),
+        camera_(working_.isReduced() ? CameraModel(working_.calibration()) : camera),
         options_(options),
-        filter_(withTrustIn(camera.calibration(), options.filter)),
+        filter_(withTrustIn(camera_.calibration(), options.filter)),
         noise_(options.filter),
         cascade_(options.matcher, options.cascade),
         relocaliser_(options.relocaliser, options.map, options.image) {
@@ -68,6 +70,7 @@ class Tracker::Implementation {
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
+  void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);
   void retire(const std::vector<FeatureId>& ids, TrackedFrame* frame);
@@ -80,7 +83,8 @@ class Tracker::Implementation {
   void describeState(TrackedFrame* frame) const;
   static void describeMatches(FrameState current, TrackedFrame* frame);
 
-  CameraModel camera_;
+  WorkingSize working_;
+  CameraModel camera_;  ///< of images of the working size
   TrackerOptions options_;
   Ekf filter_;
   FrameNoise noise_;

@@ -135,7 +135,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
     throw std::runtime_error("'" + path + "': " + why);
   };
   if (!sameImaging(content.camera, camera_.calibration()))
-    refuse("the map was made with another camera or calibration");
+    refuse("the map was made with another camera, calibration or image/working_width");
   if (content.template_size_px != options_.image.template_size_px ||
       content.source_patch_size_px != options_.image.source_patch_size_px)
     refuse("the map was made with another image/template_size_px or image/source_patch_size_px");
