@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "active_matching_slam/math/pixel_scale.h"
 #include "active_matching_slam/tracker/tracker.h"
 #include "reference_matcher.h"
 
@@ -18,8 +19,10 @@ TrackerOptions referenceOptions(const Sequence& sequence, int features) {
   options.map.features_per_frame = features;
   options.map.maximum_features = features + features / 2 + 20;
   // Room for so many, and corners that are none too good, as section 7.5 has them.
-  const double area_px = double(sequence.camera.width()) * sequence.camera.height();
-  options.map.minimum_distance_px = std::clamp(std::sqrt(area_px / (4.0 * features)), 6.0, 20.0);
+  const int width = sequence.camera.width(), height = sequence.camera.height();
+  options.image.working_width = std::max(options.image.working_width, width);
+  const double distance_px = std::sqrt(double(width) * height / (4.0 * features));
+  options.map.minimum_distance_px = std::clamp(distance_px, 6.0, 20.0) / pixelScale(width, height);
   options.image.corner_quality = 0.05;
   return options;
 }

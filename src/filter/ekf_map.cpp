@@ -114,7 +114,6 @@ FeatureId Ekf::addPointFeature(const Eigen::Vector3d& position_world,
 void Ekf::addLandmarkNoise(const CameraModel& camera, double interval_s, double sigma_px) {
   if (!(interval_s > 0.0) || !std::isfinite(interval_s) || !(sigma_px > 0.0)) return;
   const double sigma_rad = sigma_px / camera.calibration().fx;
-  auto P = covariance_.view();
   for (const FeatureState& feature : features_) {
     const Eigen::Vector3d from_camera = feature.position() - camera_.position_world;
     const double distance = from_camera.norm();
@@ -122,12 +121,31 @@ void Ekf::addLandmarkNoise(const CameraModel& camera, double interval_s, double 
     const Eigen::Vector3d ray = from_camera / distance;
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
     const double turned_rad = (across * camera_.velocity_world).norm() * interval_s / distance;
-    const double variance = sigma_rad * sigma_rad * turned_rad;
-    if (feature.kind == FeatureKind::kPoint)
-      P.block<3, 3>(feature.offset, feature.offset) += variance * distance * distance * across;
-    else
-      P.diagonal().segment<2>(feature.bearingRow()).array() += variance;
+    addAcrossRay(feature, across, distance, sigma_rad * sigma_rad * turned_rad);
   }
+}
+
+void Ekf::loosenLandmark(const CameraModel& camera, FeatureId id, double sigma_px) {
+  const FeatureState* feature = find(id);
+  if (!feature || !(sigma_px > 0.0) || !std::isfinite(sigma_px)) return;
+  const double sigma_rad = sigma_px / camera.calibration().fx;
+  const Eigen::Vector3d from_camera = feature->position() - camera_.position_world;
+  const double distance = from_camera.norm();
+  if (!(distance > 0.0)) return;
+  const Eigen::Vector3d ray = from_camera / distance;
+  addAcrossRay(*feature, Eigen::Matrix3d::Identity() - ray * ray.transpose(), distance,
+               sigma_rad * sigma_rad);
+}
+
+/// Adds variance_rad2 across the ray, along which `across` is zero; to the bearing of an inverse
+/// depth, whose anchor is taken to be as far off as the camera.
+void Ekf::addAcrossRay(const FeatureState& feature, const Eigen::Matrix3d& across, double distance,
+                       double variance_rad2) {
+  auto P = covariance_.view();
+  if (feature.kind == FeatureKind::kPoint)
+    P.block<3, 3>(feature.offset, feature.offset) += variance_rad2 * distance * distance * across;
+  else
+    P.diagonal().segment<2>(feature.bearingRow()).array() += variance_rad2;
 }
 
 void Ekf::removeFeatures(const std::vector<FeatureId>& ids) {

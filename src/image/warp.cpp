@@ -97,6 +97,13 @@ std::optional<PatchPlane> planeOf(const SourcePatch& patch, const CameraModel& c
   return plane;
 }
 
+/// Of the plane, in the camera now; any length.
+Eigen::Vector3d normalNow(const PatchPlane& plane, const Eigen::Matrix2d& tangent_metric_px2,
+                          const Eigen::Vector2d& slope_per_px) {
+  return plane.R_now_first *
+         (plane.bearing + plane.d_bearing_d_first * (tangent_metric_px2 * slope_per_px));
+}
+
 }  // namespace
 
 std::optional<PatchView> predictFlatView(const SourcePatch& patch, const CameraModel& camera,
@@ -133,8 +140,7 @@ bool bendView(const SourcePatch& patch, const CameraModel& camera,
   // The homography inverted, by Sherman and Morrison: b ~ R^T (b' (1 + m . t) - t (m . b')), where
   // m = R n.
   const Eigen::Vector3d normal_now =
-      plane->R_now_first *
-      (plane->bearing + plane->d_bearing_d_first * (view->tangent_metric_px2 * patch.slope_per_px));
+      normalNow(*plane, view->tangent_metric_px2, patch.slope_per_px);
   const double facing = 1.0 + normal_now.dot(plane->shift);
   if (!(facing > 0.0)) return std::isfinite(facing);
   const Eigen::Matrix3d R_first_now = plane->R_now_first.transpose();
@@ -200,6 +206,27 @@ bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_
   result->size = template_size_px;
   updateSums(result);
   return true;
+}
+
+std::optional<SourcePatch> retakeSourcePatch(const SourcePatch& patch, const CameraModel& camera,
+                                             const Eigen::Isometry3d& T_world_camera_now,
+                                             const Eigen::Vector4d& point_world_homogeneous,
+                                             const cv::Mat& image, const Eigen::Vector2d& pixel,
+                                             int size_px) {
+  auto retaken = extractSourcePatch(image, pixel, T_world_camera_now, size_px);
+  if (!retaken || patch.slope_information_px2.isZero(0.0)) return retaken;
+  const auto view = predictFlatView(patch, camera, T_world_camera_now, point_world_homogeneous);
+  const auto plane = planeOf(patch, camera, T_world_camera_now, point_world_homogeneous);
+  Eigen::Matrix<double, 3, 2> d_bearing_d_pixel;
+  const auto bearing = camera.unproject(pixel, &d_bearing_d_pixel);
+  if (!view || !plane || !bearing) return std::nullopt;
+  const Eigen::Vector3d normal = normalNow(*plane, view->tangent_metric_px2, patch.slope_per_px);
+  const double facing = normal.dot(*bearing);
+  if (!(facing > 0.0)) return std::nullopt;
+  retaken->slope_per_px = d_bearing_d_pixel.transpose() * normal / facing;
+  retaken->slope_information_px2 =
+      view->affine * patch.slope_information_px2 * view->affine.transpose();
+  return retaken;
 }
 
 bool warpCoarseTemplate(const TemplateSource& source, int level, int template_size_px,

@@ -163,6 +163,10 @@ void FeatureMap::learnSlope(const VisibleFeature& feature, const Template& expec
     active_matching_slam::learnSlope(image, pixel, expected, feature.view, &known->patch);
 }
 
+void FeatureMap::retakePatch(FeatureId id, const SourcePatch& patch) {
+  if (MapFeature* feature = findMutable(id)) feature->patch = patch;
+}
+
 void FeatureMap::learnNoise(FeatureId id, const Eigen::Vector2d& residual) {
   if (MapFeature* feature = findMutable(id)) feature->noise.learn(residual);
 }

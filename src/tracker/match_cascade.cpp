@@ -90,7 +90,7 @@ void MatchCascade::match(const MatchOptions& matching, bool fallbacks, FrameStat
 }
 
 void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* frame) {
-  const double scale = pixelScale(frame->image.cols);
+  const double scale = pixelScale(frame->image.cols, frame->image.rows);
   const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2 * scale * scale;
   const bool can_jerk = frame->jerk_px.size() > 0 && !frame->jerk_px.isZero();
   const auto guided = is_wide ? guidedPrior(*frame, frame->prior) : std::nullopt;

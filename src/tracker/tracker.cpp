@@ -63,9 +63,10 @@ void Tracker::Implementation::clearMap() {
 void Tracker::Implementation::setOptions(const TrackerOptions& options) {
   checkTrackerOptions(options);
   if (options.image.template_size_px != options_.image.template_size_px ||
-      options.image.source_patch_size_px != options_.image.source_patch_size_px)
+      options.image.source_patch_size_px != options_.image.source_patch_size_px ||
+      options.image.working_width != options_.image.working_width)
     throw std::invalid_argument(
-        "image/template_size_px and image/source_patch_size_px can't change "
+        "image/template_size_px, image/source_patch_size_px and image/working_width can't change "
         "while a map is kept");
   cascade_.setOptions(options.matcher, options.cascade);
   filter_.setOptions(withTrustIn(camera_.calibration(), options.filter));
@@ -93,9 +94,9 @@ bool Tracker::Implementation::accept(const cv::Mat& image, double stamp_s, Track
     fault << "the image is empty";
   } else if (image.type() != CV_8UC1) {
     fault << "the image is not 8-bit grey";
-  } else if (image.cols != camera_.width() || image.rows != camera_.height()) {
+  } else if (image.cols != working_.givenWidth() || image.rows != working_.givenHeight()) {
     fault << "the image is " << image.cols << " x " << image.rows << ", the calibration "
-          << camera_.width() << " x " << camera_.height();
+          << working_.givenWidth() << " x " << working_.givenHeight();
   } else if (!std::isfinite(stamp_s)) {
     fault << "the stamp is not a finite number";
   } else if (state_ != TrackingState::kWaiting && stamp_s < last_stamp_s_) {
@@ -128,6 +129,7 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   frame->timings_ms.update = stage.lap();
   if (is_restarted || giveUpWrongMap(current, frame)) return current;
   updateTrackingState(current);
+  retakePatches(current);
   maintainMap(image, frame);
   frame->timings_ms.map = stage.lap();
   if (options_.structure) updateStructure(frame);
@@ -135,17 +137,18 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   return current;
 }
 
-std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat& image,
+std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat& given,
                                                                    double stamp_s) {
   auto frame = std::make_shared<TrackedFrame>();
   StopWatch total, stage;
   frame->stamp_s = stamp_s;
   frame->index = images_++;
-  if (!accept(image, stamp_s, frame.get())) {
+  if (!accept(given, stamp_s, frame.get())) {
     frame->state = state_;
     describeState(frame.get());
     return frame;
   }
+  const cv::Mat image = working_.reduce(given);
   camera_ = camera_.corrected(filter_.camera().lens);
   frame->image = image;
   frame->repeated_image = !previous_image_.empty() && isRepeatedImage(image, previous_image_);
@@ -173,8 +176,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   }
   previous_image_ = image.clone();  // the caller may use its memory again
   if (poor_frames_ == 0) reference_image_ = previous_image_;
+  if (lookForOtherMaps(image, frame.get())) current.reset();
   frame->state = state_;
-  if (!lost_maps_.empty()) lookForOtherMaps(image, frame.get());
   if (!reason_.empty()) frame->reason = reason_;
   describeState(frame.get());
   if (current) describeMatches(std::move(*current), frame.get());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "active_matching_slam/filter/motion_noise.h"
+#include "active_matching_slam/image/working_size.h"
 #include "active_matching_slam/information/map_structure.h"
 #include "active_matching_slam/initialisation/initialiser.h"
 #include "active_matching_slam/map/feature_map.h"
@@ -30,9 +31,10 @@ constexpr int kRelocalisationPeriodFrames = 4;
 class Tracker::Implementation {
  public:
   Implementation(const CameraModel& camera, const TrackerOptions& options)
-      : camera_(camera),
+      : working_(camera.calibration(), options.image.working_width),
+        camera_(working_.isReduced() ? CameraModel(working_.calibration()) : camera),
         options_(options),
-        filter_(withTrustIn(camera.calibration(), options.filter)),
+        filter_(withTrustIn(camera_.calibration(), options.filter)),
         noise_(options.filter),
         motion_noise_(options.filter),
         cascade_(options.matcher, options.cascade),
@@ -71,12 +73,13 @@ class Tracker::Implementation {
   bool relocalise(const cv::Mat& image, TrackedFrame* frame);
   void placeCamera(const Relocalisation& found, TrackedFrame* frame);
   bool beginNewMap(const cv::Mat& image, TrackedFrame* frame);
-  void lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame);
+  bool lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame);
   void abandonMap(const std::string& reason);
   void clearMap();
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
+  void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);
   void retire(const std::vector<FeatureId>& ids, TrackedFrame* frame);
@@ -102,7 +105,8 @@ class Tracker::Implementation {
   LostMap storeMap();
   void takeMap(LostMap stored);
 
-  CameraModel camera_;
+  WorkingSize working_;
+  CameraModel camera_;  ///< of images of the working size
   TrackerOptions options_;
   Ekf filter_;
   FrameNoise noise_;

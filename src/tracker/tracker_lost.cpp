@@ -140,8 +140,8 @@ bool Tracker::Implementation::beginNewMap(const cv::Mat& image, TrackedFrame* fr
 }
 
 /// While the camera is tracked in one map, looks for it in those in which it was lost. Found, it
-/// goes on in that one; the other is kept in its place.
-void Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame) {
+/// goes on in that one; the other is kept in its place. Whether it is.
+bool Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame) {
   if (options_.reset_when_lost_after_s > 0.0) {
     lost_maps_.erase(std::remove_if(lost_maps_.begin(), lost_maps_.end(),
                                     [this](const LostMap& lost) {
@@ -150,11 +150,11 @@ void Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFram
                                     }),
                      lost_maps_.end());
   }
-  if (lost_maps_.empty() || last_stamp_s_ - last_look_stamp_s_ < kLookPeriodS) return;
+  if (lost_maps_.empty() || last_stamp_s_ - last_look_stamp_s_ < kLookPeriodS) return false;
   last_look_stamp_s_ = last_stamp_s_;
   const std::size_t k = next_lost_map_++ % lost_maps_.size();
   const auto found = relocaliser_.find(camera_, image, lost_maps_[k].filter, lost_maps_[k].map);
-  if (!found) return;
+  if (!found) return false;
   LostMap left = storeMap();
   left.lost_stamp_s = last_stamp_s_;
   std::swap(left, lost_maps_[k]);
@@ -163,6 +163,7 @@ void Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFram
   if (!relocaliser_.canFind(lost_maps_[k].filter, lost_maps_[k].map))
     lost_maps_.erase(lost_maps_.begin() + static_cast<std::ptrdiff_t>(k));
   frame->reason = "found again in map " + std::to_string(map_number_);
+  return true;
 }
 
 /// Searches the whole image for the whole map. False when the camera is not found; the state is
@@ -221,7 +222,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
     throw std::runtime_error("'" + path + "': " + why);
   };
   if (!sameImaging(content.camera, camera_.calibration()))
-    refuse("the map was made with another camera or calibration");
+    refuse("the map was made with another camera, calibration or image/working_width");
   if (content.template_size_px != options_.image.template_size_px ||
       content.source_patch_size_px != options_.image.source_patch_size_px)
     refuse("the map was made with another image/template_size_px or image/source_patch_size_px");

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <cmath>
 
 #include "active_matching_slam/image/corners.h"
 #include "active_matching_slam/image/warp.h"
+#include "active_matching_slam/math/pixel_scale.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
@@ -46,6 +48,34 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   if (excess > 0) retire(map_.leastUseful(filter_, excess), frame);
   frame->features_started +=
       startFeatures(image, visible, std::min(wanted, kMaximumStartsPerFrame), frame);
+}
+
+/// Takes the source patches anew of features that have grown or shrunk half way to where they can't
+/// be searched any more: around where the old patch, aligned to a fraction of a pixel, was matched.
+/// That match misses the landmark by its noise, and the new patch will go on to: so the landmark is
+/// taken to be that much off across its ray. Known points stay what they are.
+void Tracker::Implementation::retakePatches(const FrameState& current) {
+  if (poor_frames_ > 0 || !initialiser_.isDone()) return;
+  const double least_score = 0.5 * (1.0 + options_.image.match_threshold);
+  for (std::size_t k = 0; k < current.measurements.size(); ++k) {
+    const FeatureMeasurement& measurement = current.measurements[k];
+    const MapFeature* feature = map_.find(measurement.id);
+    const FeatureState* state = filter_.find(measurement.id);
+    if (!feature || !state || feature->known) continue;
+    const double scale = current.candidates[current.inliers[k]].view.scale;
+    if (scale * scale <= options_.map.maximum_scale && scale * scale >= options_.map.minimum_scale)
+      continue;
+    const int i = current.inliers[k];
+    const SearchMatch& match = current.search.matches(i)[current.matching.match_of_feature[i]];
+    if (!(match.sigma_px > 0.0) || match.score < least_score) continue;
+    const auto patch = retakeSourcePatch(
+        feature->patch, camera_, filter_.camera().poseWorldCamera(), homogeneousPosition(*state),
+        current.image, measurement.pixel, options_.image.source_patch_size_px);
+    if (!patch) continue;
+    map_.retakePatch(measurement.id, *patch);
+    filter_.loosenLandmark(camera_, measurement.id,
+                           measurement.sigma_px * std::sqrt(measurement.variance_inflation));
+  }
 }
 
 /// Adds the frame to the graph of mutual information: all that is predicted visible. What was
@@ -125,10 +155,11 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
   const std::vector<DepthSample> known_depths = knownDepths(visible);
   const double relative_sigma =
       options_.filter.initial_sigma_inverse_depth / options_.filter.initial_inverse_depth;
+  const double distance_px =
+      options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
   int started = 0;
   std::vector<FeatureMeasurement> first_sights;
-  for (const Corner& corner :
-       detectCorners(image, occupied, wanted, options_.map.minimum_distance_px, options_.image)) {
+  for (const Corner& corner : detectCorners(image, occupied, wanted, distance_px, options_.image)) {
     auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
                                     options_.image.source_patch_size_px);
     if (!patch) continue;

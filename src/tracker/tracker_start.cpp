@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/image/image_quality.h"
@@ -9,9 +10,22 @@
 namespace active_matching_slam {
 namespace {
 
+/// Side of the smallest template of a known point. Standard: the least of image/template_size_px.
+constexpr int kLeastTemplateSide = 5;
 /// Standard deviation of the first camera, which is the world's frame. Derivation: 0, but that the
 /// covariance stays positive definite [m, rad].
 constexpr double kStartSigmaPosition = 1e-4, kStartSigmaRotation = 1e-4;
+
+/// A known point, given as in an image of the camera, for one of the size at which it is tracked.
+KnownPoint reducedPoint(KnownPoint point, const WorkingSize& working) {
+  point.image_px = working.reduce(point.image_px);
+  if (point.template_image.empty() || !working.isReduced()) return point;
+  const int half = static_cast<int>(working.scale() * point.template_image.cols / 2);
+  const int side = std::max(2 * half + 1, kLeastTemplateSide);
+  cv::resize(cv::Mat(point.template_image), point.template_image, {side, side}, 0.0, 0.0,
+             cv::INTER_AREA);
+  return point;
+}
 
 }  // namespace
 
@@ -93,8 +107,11 @@ bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame
 }
 
 bool Tracker::Implementation::startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame) {
-  const auto found = findKnownStart(image, camera_, options_.known_points,
-                                    options_.known_points_search_px, options_.image, &reason_);
+  std::vector<KnownPoint> points = options_.known_points;
+  for (KnownPoint& point : points) point = reducedPoint(point, working_);
+  const auto found =
+      findKnownStart(image, camera_, points, working_.scale() * options_.known_points_search_px,
+                     options_.image, &reason_);
   if (!found) {
     state_ = TrackingState::kInitialising;
     return false;

@@ -74,6 +74,25 @@ Ekf filterWithAPoint(const CameraModel& model) {
   return filter;
 }
 
+TEST_F(EkfMap, ALoosenedLandmarkIsThatMuchLessCertainInTheImageAndNoOther) {
+  Ekf filter = filterWithAPoint(model_);
+  std::vector<FeatureId> ids;
+  for (const FeatureState& feature : filter.features()) ids.push_back(feature.id);
+  const double sigma_px = 0.4;
+  const FeatureId loosened = ids.back();
+  const Eigen::MatrixXd before = filter.predictMeasurements(model_, ids, 0.0).S;
+  filter.loosenLandmark(model_, loosened, sigma_px);
+  filter.loosenLandmark(model_, ids.back() + 1, sigma_px);  // nobody's
+  const auto after = filter.predictMeasurements(model_, ids, 0.0);
+  const Eigen::MatrixXd growth = after.S - before;
+  const Eigen::Index last = growth.rows() - 2;
+  ASSERT_EQ(after.ids.back(), loosened);
+  // Pixels are smaller angles away from the image centre.
+  EXPECT_NEAR(std::sqrt(growth.block<2, 2>(last, last).determinant()), sigma_px * sigma_px,
+              0.25 * sigma_px * sigma_px);
+  EXPECT_LT(growth.topLeftCorner(last, last).norm(), 1e-9);
+}
+
 TEST_F(EkfMap, LandmarkNoiseIsARandomWalkAcrossTheRayByTheAngleOfTheView) {
   Ekf filter = filterWithAPoint(model_);
   const double sigma_px = 2.0;

@@ -114,6 +114,10 @@ class Ekf {
   /// random walk of `sigma_px` per axis and root of a radian. After predict(interval_s).
   void addLandmarkNoise(const CameraModel& camera, double interval_s, double sigma_px);
 
+  /// One landmark has moved across its ray from the camera by `sigma_px` per axis. Ignores unknown
+  /// ids.
+  void loosenLandmark(const CameraModel& camera, FeatureId id, double sigma_px);
+
   /// Velocities decay to `fraction` of themselves, 0 to 1; what they lose is one standard deviation
   /// more of them (covariance inflation).
   void decayVelocity(double fraction);
@@ -175,6 +179,8 @@ class Ekf {
   FeatureState& appendFeature(FeatureKind kind);
   void assignOffsets();
   void limitInverseDepths();
+  void addAcrossRay(const FeatureState& feature, const Eigen::Matrix3d& across, double distance,
+                    double variance_rad2);
   /// P <- M (P - X X^T + D) M^T with M = I + C L^T, the transport of the gauge: C is the change of
   /// its generators, L its functionals, PL = P L; D is `added` for the motion and else zero. X: the
   /// first `columns` columns of `X`, which has kGaugeFreedoms to spare. False when variances had to

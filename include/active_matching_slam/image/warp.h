@@ -71,6 +71,14 @@ class SourceOffset {
 bool warpTemplate(const SourcePatch& patch, const PatchView& view, int template_size_px,
                   Template* result);
 
+/// The patch taken anew from `image`, of the present camera, where the feature was matched at
+/// `pixel`: it lies in the same plane. Empty when that is too near the border.
+std::optional<SourcePatch> retakeSourcePatch(const SourcePatch& patch, const CameraModel& camera,
+                                             const Eigen::Isometry3d& T_world_camera_now,
+                                             const Eigen::Vector4d& point_world_homogeneous,
+                                             const cv::Mat& image, const Eigen::Vector2d& pixel,
+                                             int size_px);
+
 /// What a feature's templates are warped from.
 struct TemplateSource {
   SourcePatch patch;

@@ -85,6 +85,9 @@ class FeatureMap {
   void learnSlope(const VisibleFeature& feature, const Template& expected, const cv::Mat& image,
                   const Eigen::Vector2d& pixel);
 
+  /// Gives a feature a patch taken later. Ignores unknown ids.
+  void retakePatch(FeatureId id, const SourcePatch& patch);
+
   /// LandmarkNoise::learn(). Ignores unknown ids.
   void learnNoise(FeatureId id, const Eigen::Vector2d& residual);
 

@@ -6,9 +6,10 @@ namespace active_matching_slam {
 
 /// Settings of map maintenance.
 struct MapOptions {
-  int features_per_frame = 60;      ///< wanted measured features in a frame
-  int maximum_features = 150;       ///< the map never holds more
-  double minimum_distance_px = 20;  ///< a new feature keeps from every predicted one
+  int features_per_frame = 60;  ///< wanted measured features in a frame
+  int maximum_features = 150;   ///< the map never holds more
+  /// A new feature keeps from every predicted one [px of an image of 640 x 480].
+  double minimum_distance_px = 20;
   double maximum_view_angle_deg = 60.0;
   double minimum_scale = 0.5, maximum_scale = 2.0;  ///< scale change since the first view
   int retire_after_attempts = 10;                   ///< a feature searched this often ...
@@ -25,7 +26,8 @@ void MapOptions::visitFields(Self& o, Visitor&& visit) {
   visit(basicOption("map/maximum_features", "", "the map never holds more"), o.maximum_features, 4,
         5000);
   visit(basicOption("map/minimum_distance_px", "px",
-                    "between a new feature and every other in the image"),
+                    "between a new feature and every other in an image of 640 x 480; in others by "
+                    "the root of the number of pixels"),
         o.minimum_distance_px, 2.0, 500.0);
   visit(advancedOption("map/maximum_view_angle_deg", "deg",
                        "a feature is searched while its direction has turned less since first "

@@ -103,7 +103,9 @@ struct TrackedFrame {
   std::shared_ptr<const MutualInformationGraph> graph;  ///< null unless asked for
   std::shared_ptr<const SubmapHierarchy> submaps;       ///< null unless asked for
 
-  cv::Mat image;  ///< 8-bit grey, as tracked (shared, not to be written to)
+  /// 8-bit grey, as tracked (shared, not to be written to): of the working size, see
+  /// ImageOptions::working_width. All pixels are of this image.
+  cv::Mat image;
   FrameTimings timings_ms;
 };
 
