@@ -26,8 +26,14 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.features_started = frame.features_started;
   record.features_retired = frame.features_retired;
   record.features_converted = frame.features_converted;
+  record.features_failed = frame.features_failed;
   record.resets = frame.resets;
   record.times_lost = frame.times_lost;
+  record.map = frame.map;
+  record.jumps = frame.jumps;
+  record.quality = frame.quality;
+  record.quality_reason = frame.quality_reason;
+  record.accelerations = frame.accelerations;
   record.matching = frame.matching.statistics;
   record.timings_ms = frame.timings_ms;
   return record;

@@ -71,7 +71,13 @@ void addStateColumns(const FrameErrors& errors, std::vector<Column>* columns) {
       column("nis", &FrameRecord::nis),
       column("nis_degrees", &FrameRecord::nis_degrees),
       column("resets", &FrameRecord::resets),
-      column("times_lost", &FrameRecord::times_lost)};
+      column("times_lost", &FrameRecord::times_lost),
+      column("map", &FrameRecord::map),
+      column("jumps", &FrameRecord::jumps),
+      column("quality", &FrameRecord::quality),
+      column("quality_reason", &FrameRecord::quality_reason),
+      column("acceleration_mps2", [](R r) { return r.accelerations.linear_mps2; }),
+      column("angular_acceleration_rps2", [](R r) { return r.accelerations.angular_rps2; })};
   columns->insert(columns->end(), state.begin(), state.end());
 }
 
@@ -98,7 +104,8 @@ void addMatchingColumns(std::vector<Column>* columns) {
       column("map_points", &FrameRecord::map_points),
       column("features_started", &FrameRecord::features_started),
       column("features_retired", &FrameRecord::features_retired),
-      column("features_converted", &FrameRecord::features_converted)};
+      column("features_converted", &FrameRecord::features_converted),
+      column("features_failed", &FrameRecord::features_failed)};
   columns->insert(columns->end(), matching.begin(), matching.end());
 }
 
@@ -148,9 +155,26 @@ std::string RunReport::statisticsCsv() const {
   return text;
 }
 
+std::string RunReport::trajectoryText() const {
+  std::string text;
+  const FrameRecord* before = nullptr;
+  for (const FrameRecord& record : records_) {
+    if (!record.isTracked()) continue;
+    if (before && record.map != before->map) {
+      text += "# from here on in map " + std::to_string(record.map) + ", not " +
+              std::to_string(before->map) + ": another world and unit of length\n";
+    } else if (before && record.jumps != before->jumps) {
+      text += "# here the pose jumps: lost before, and found again in the same map\n";
+    }
+    text += trajectoryTumText({record.pose});
+    before = &record;
+  }
+  return text;
+}
+
 void RunReport::write(const std::string& directory) const {
   writeTextFile(directory + "/statistics.csv", statisticsCsv());
-  writeTextFile(directory + "/trajectory.txt", trajectoryTumText(trajectory()));
+  writeTextFile(directory + "/trajectory.txt", trajectoryText());
   writeTextFile(directory + "/summary.json", summaryJson(summary()));
   writeTrajectoryPlot(directory + "/trajectory.png", trajectoryPlotOf(*this));
   if (graph_) writeStructureReport(directory, *graph_, *submaps_);

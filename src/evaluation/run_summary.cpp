@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
+#include <utility>
 
 #include "active_matching_slam/evaluation/consistency.h"
 
@@ -15,13 +18,25 @@ bool isMetric(const std::vector<FrameRecord>& records) {
   return !records.empty() && records.back().scale_source != ScaleSource::kFree;
 }
 
+/// The map in which most frames were tracked.
+int mainMap(const std::vector<FrameRecord>& records) {
+  std::map<int, int> frames_in;
+  for (const FrameRecord& record : records)
+    if (record.isTracked()) ++frames_in[record.map];
+  const auto most = std::max_element(frames_in.begin(), frames_in.end(), [](auto a, auto b) {
+    return a.second < b.second;
+  });
+  return most == frames_in.end() ? 0 : most->first;
+}
+
 /// Pairs of (record, true pose in truth.trajectory) of the tracked frames, by ascending stamp.
 std::vector<std::pair<int, int>> associateTracked(const std::vector<FrameRecord>& records,
                                                   const RunTruth& truth) {
   std::vector<int> record_of_pose;
   Trajectory tracked;
+  const int main_map = mainMap(records);
   for (std::size_t i = 0; i < records.size(); ++i) {
-    if (!records[i].isTracked()) continue;
+    if (!records[i].isTracked() || records[i].map != main_map) continue;
     record_of_pose.push_back(static_cast<int>(i));
     tracked.push_back(records[i].pose);
   }
@@ -106,6 +121,25 @@ void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summ
     summary->converted += record.features_converted;
     summary->times_lost = std::max(summary->times_lost, record.times_lost);
     summary->resets = std::max(summary->resets, record.resets);
+  }
+  std::set<int> maps;
+  std::vector<double> qualities;
+  std::map<std::string, int> causes;
+  summary->main_map = mainMap(records);
+  for (const FrameRecord& record : records) {
+    if (!record.isTracked()) continue;
+    maps.insert(record.map);
+    if (record.map == summary->main_map) ++summary->frames_in_main_map;
+    qualities.push_back(record.quality);
+    if (!record.quality_reason.empty()) ++causes[record.quality_reason];
+  }
+  summary->maps = static_cast<int>(maps.size());
+  if (!qualities.empty()) summary->quality = percentile(std::move(qualities), 0.5);
+  int most = 0;
+  for (const auto& [cause, frames] : causes) {
+    if (frames <= most) continue;
+    most = frames;
+    summary->quality_reason = cause;
   }
   if (summary->frames_tracked > 0) {
     summary->matched_mean = matched / summary->frames_tracked;

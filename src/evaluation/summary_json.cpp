@@ -17,6 +17,11 @@ std::string summaryJson(const RunSummary& s) {
   json["frames_tracked"] = s.frames_tracked;
   json["times_lost"] = s.times_lost;
   json["resets"] = s.resets;
+  json["maps"] = s.maps;
+  json["main_map"] = s.main_map;
+  json["frames_in_main_map"] = s.frames_in_main_map;
+  json["quality"] = s.quality;
+  json["quality_reason"] = s.quality_reason;
   json["duration_s"] = s.duration_s;
   json["matcher"] = s.matcher.empty() ? Json(nullptr) : Json(s.matcher);
   json["scale_source"] = scaleSourceName(s.scale_source);

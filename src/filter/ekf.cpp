@@ -32,7 +32,7 @@ void Ekf::reset(const CameraState& camera, const MotionCovariance& covariance) {
   P.diagonal().tail<CameraError::kCalibrationSize>() = calibrationSigmas(options_).array().square();
 }
 
-void Ekf::predict(double interval_s) {
+void Ekf::predict(double interval_s, const Accelerations& sigmas) {
   if (!(interval_s > 0.0) || !std::isfinite(interval_s)) return;
   const Eigen::Vector3d turn = camera_.angular_velocity_camera * interval_s;
   // exp([R (w + dw) dt]x) R = R exp([(w + dw) dt]x): the rotation error gains K dw in the world.
@@ -52,10 +52,7 @@ void Ekf::predict(double interval_s) {
   MotionCovariance predicted = F * P_camera * F.transpose();
 
   // Impulses V = a dt, Omega = alpha dt enter like the velocities themselves (eq. 3.7).
-  impulse_ = Impulse{
-      interval_s, F.rightCols<6>(),
-      impulseVariance({options_.sigma_acceleration_mps2, options_.sigma_angular_acceleration_rps2},
-                      interval_s)};
+  impulse_ = Impulse{interval_s, F.rightCols<6>(), impulseVariance(sigmas, interval_s)};
   predicted += impulse_->G * impulse_->variance.asDiagonal() * impulse_->G.transpose();
   P_camera = 0.5 * (predicted + predicted.transpose());
 
@@ -69,7 +66,15 @@ void Ekf::predict(double interval_s) {
   P.bottomLeftCorner(rest, CameraError::kMotionSize) = motion_rest.transpose();
 }
 
-Eigen::Matrix<double, 6, 1> Ekf::impulseVariance(const Accelerations& sigmas, double interval_s) {
+void Ekf::replaceAccelerations(const Accelerations& sigmas) {
+  if (!impulse_) return;
+  const Eigen::Matrix<double, 6, 1> variance = impulseVariance(sigmas, impulse_->interval_s);
+  covariance_.view().topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() +=
+      impulse_->G * (variance - impulse_->variance).asDiagonal() * impulse_->G.transpose();
+  impulse_->variance = variance;
+}
+
+Eigen::Matrix<double, 6, 1> impulseVariance(const Accelerations& sigmas, double interval_s) {
   Eigen::Matrix<double, 6, 1> variance;
   variance.head<3>().setConstant(std::pow(sigmas.linear_mps2 * interval_s, 2));
   variance.tail<3>().setConstant(std::pow(sigmas.angular_rps2 * interval_s, 2));

@@ -34,9 +34,11 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
     predicted.S.block<2, 2>(2 * i, 2 * i) +=
         secondOrderNoise(stack.projection(i), relativeCovariance(feature, covariance_));
   }
-  if (instead && impulse_) {
-    const Eigen::MatrixXd A =
+  if (impulse_)
+    predicted.impulse_px =
         stack.cameraJacobian().leftCols<CameraError::kMotionSize>() * impulse_->G;
+  if (instead && impulse_) {
+    const Eigen::MatrixXd& A = predicted.impulse_px;
     const Eigen::Matrix<double, 6, 1> more =
         impulseVariance(*instead, impulse_->interval_s) - impulse_->variance;
     predicted.S.triangularView<Eigen::Lower>() += A * (more.asDiagonal() * A.transpose());
@@ -88,6 +90,8 @@ UpdateReport Ekf::update(const CameraModel& camera,
   }
   report.noise_scale = correction.noiseScale();
   report.noise_degrees = correction.noiseDegrees();
+  report.linear = correction.linearImpulse();
+  report.angular = correction.angularImpulse();
   const MotionCovariance added = correction.finish();
   impulse_.reset();
   camera_ = correction.camera();

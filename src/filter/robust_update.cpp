@@ -175,6 +175,17 @@ bool RobustUpdate::estimateNoise(const Eigen::VectorXd& innovation, Eigen::Matri
   return true;
 }
 
+/// The impulse's posterior mean B^T S^-1 y, in units of its standard deviation, has the covariance
+/// B^T S^-1 B where the variance allowed for is right. By the last factorisation of S.
+void RobustUpdate::estimateImpulse(const Eigen::MatrixXd& B, const Eigen::VectorXd& innovation) {
+  const Eigen::MatrixXd root = llt_.matrixL().solve(B);
+  const Eigen::Matrix<double, 6, 1> squares =
+      (root.transpose() * llt_.matrixL().solve(innovation)).array().square();
+  const Eigen::Matrix<double, 6, 1> degrees = root.colwise().squaredNorm();
+  linear_impulse_ = {squares.head<3>().sum(), degrees.head<3>().sum()};
+  angular_impulse_ = {squares.tail<3>().sum(), degrees.tail<3>().sum()};
+}
+
 bool RobustUpdate::step(bool first) {
   stack_.crossCovariance(covariance_, X_);
   Eigen::VectorXd innovation = z_ - stack_.pixels();
@@ -191,7 +202,10 @@ bool RobustUpdate::step(bool first) {
     B.noalias() += HC * (L_.topRows<kMotion>().transpose() * impulse_);
   }
   addNoise(S);
-  if (first && !estimateNoise(innovation, S)) return false;
+  if (first) {
+    if (!estimateNoise(innovation, S)) return false;
+    estimateImpulse(B, innovation);
+  }
   for (std::size_t i = 0; i < measurements_.size(); ++i)
     S.block<2, 2>(2 * i, 2 * i) += measurements_[i].correlatedVariance() * measurements_[i].shape;
   llt_.compute(S);

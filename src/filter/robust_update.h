@@ -62,6 +62,9 @@ class RobustUpdate {
   /// UpdateReport::noise_scale and noise_degrees.
   double noiseScale() const { return noise_scale_; }
   double noiseDegrees() const { return noise_degrees_; }
+  /// UpdateReport::linear and angular.
+  const ImpulseEstimate& linearImpulse() const { return linear_impulse_; }
+  const ImpulseEstimate& angularImpulse() const { return angular_impulse_; }
   const Eigen::MatrixXd& gaugeChange() const { return C_; }       ///< state size x kGaugeFreedoms
   const Eigen::MatrixXd& gaugeFunctionals() const { return L_; }  ///< likewise
   const Eigen::MatrixXd& gaugeCovariance() const { return PL_; }  ///< P L
@@ -72,6 +75,7 @@ class RobustUpdate {
   void addNoise(Eigen::MatrixXd& S);
   bool estimateNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S);
   Eigen::Matrix<double, 6, Eigen::Dynamic> impulseGain(const Eigen::MatrixXd& B) const;
+  void estimateImpulse(const Eigen::MatrixXd& B, const Eigen::VectorXd& innovation);
   bool reweigh(const Eigen::VectorXd& weighted, const std::vector<double>& expected_px2,
                double applied, Eigen::MatrixXd& S);
   double posteriorScale() const;
@@ -97,6 +101,7 @@ class RobustUpdate {
   std::vector<double> redundancy_;
   std::vector<Eigen::Vector2d> residuals_px_;
   double noise_scale_ = 1.0, noise_degrees_ = 0.0;
+  ImpulseEstimate linear_impulse_, angular_impulse_;
   std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points
   double nis_ = 0.0;
 };

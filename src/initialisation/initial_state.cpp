@@ -42,12 +42,10 @@ CameraJacobian lastCameraJacobian(const CameraState& camera, double interval_s) 
 
 }  // namespace
 
-std::optional<InitialState> makeInitialState(const CameraModel& model, const Ekf& filter,
-                                             const BundleOptions& options,
-                                             double correlation_inflation,
-                                             const Hypothesis& hypothesis,
-                                             const Eigen::VectorXd& scale_weights,
-                                             double interval_s) {
+std::optional<InitialState> makeInitialState(
+    const CameraModel& model, const Ekf& filter, const BundleOptions& options,
+    double correlation_inflation, const Hypothesis& hypothesis,
+    const Eigen::VectorXd& scale_weights, const Accelerations& accelerations, double interval_s) {
   const Bundle& bundle = hypothesis.bundle;
   BundleOptions with_lens = options;
   with_lens.sigma_calibration = calibrationSigmas(filter.options());
@@ -82,11 +80,9 @@ std::optional<InitialState> makeInitialState(const CameraModel& model, const Ekf
         rows.middleCols<3>(kFirstFeature + 3 * kept[i]);
   }
   state.covariance = 0.5 * (state.covariance + state.covariance.transpose()).eval();
-  const FilterOptions& noise = filter.options();
-  state.covariance.diagonal().segment<3>(CameraError::kVelocity).array() +=
-      std::pow(noise.sigma_acceleration_mps2 * interval_s, 2);
-  state.covariance.diagonal().segment<3>(CameraError::kAngularVelocity).array() +=
-      std::pow(noise.sigma_angular_acceleration_rps2 * interval_s, 2);
+  const Eigen::Matrix<double, 6, 1> impulse = impulseVariance(accelerations, interval_s);
+  state.covariance.diagonal().segment<3>(CameraError::kVelocity) += impulse.head<3>();
+  state.covariance.diagonal().segment<3>(CameraError::kAngularVelocity) += impulse.tail<3>();
   return state;
 }
 

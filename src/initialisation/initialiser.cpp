@@ -142,8 +142,11 @@ std::optional<InitialState> Initialiser::commit(const CameraModel& model, const 
       scale_.apply(filter, depthInformation(model, by_noise, adjusted.bundle), &adjusted);
   const auto& keyframes = keyframes_.all();
   const double interval_s = keyframes.back().stamp_s - keyframes[keyframes.size() - 2].stamp_s;
-  auto state = makeInitialState(model, filter, by_noise, options_.correlation_inflation, adjusted,
-                                scale_weights, interval_s);
+  auto state = makeInitialState(
+      model, filter, by_noise, options_.correlation_inflation, adjusted, scale_weights,
+      expected_.value_or(Accelerations{filter.options().sigma_acceleration_mps2,
+                                       filter.options().sigma_angular_acceleration_rps2}),
+      interval_s);
   if (!state) return std::nullopt;
   state->is_first = committed_.empty();
   for (std::size_t k = 0; k < keyframes.size(); ++k) {

@@ -24,8 +24,8 @@ constexpr double kMissedDetectionSigmas = 3.0;
 /// A joint Gaussian of image points, conditioned on one after the other (chain rule).
 class PredictionChain {
  public:
-  explicit PredictionChain(const ProperPrior& prior)
-      : prior_(prior), factor_(2 * kMostKnown, 2 * kMostKnown), whitened_(2 * kMostKnown) {}
+  PredictionChain(const ProperPrior& prior, const Eigen::MatrixXd& S)
+      : prior_(prior), S_(S), factor_(2 * kMostKnown, 2 * kMostKnown), whitened_(2 * kMostKnown) {}
 
   /// Prediction of the feature, given those that are known.
   SearchEllipse predict(int feature) {
@@ -33,10 +33,10 @@ class PredictionChain {
     cross_.resize(2 * n, 2);
     for (Eigen::Index i = 0; i < n; ++i)
       cross_.middleRows<2>(2 * i) =
-          prior_.S().block<2, 2>(2 * known_[static_cast<std::size_t>(i)], 2 * feature);
+          S_.block<2, 2>(2 * known_[static_cast<std::size_t>(i)], 2 * feature);
     factor_.topLeftCorner(2 * n, 2 * n).triangularView<Eigen::Lower>().solveInPlace(cross_);
     return {prior_.mean(feature) + cross_.transpose() * whitened_.head(2 * n),
-            prior_.covariance(feature) - cross_.transpose() * cross_};
+            S_.block<2, 2>(2 * feature, 2 * feature) - cross_.transpose() * cross_};
   }
 
   /// After predict() of the same feature. Beyond kMostKnown predictions hardly improve.
@@ -52,6 +52,7 @@ class PredictionChain {
 
  private:
   const ProperPrior& prior_;
+  const Eigen::MatrixXd& S_;
   std::vector<int> known_;
   Eigen::MatrixXd factor_;  // lower Cholesky factor of the covariance of what is known
   Eigen::VectorXd whitened_;
@@ -75,8 +76,8 @@ Mixture::Evidence Mixture::evidenceOf(const Hypothesis& h, const std::vector<int
   constexpr double kLeast = 1e-300;
   Evidence evidence;
   evidence.match = h.match;
-  evidence.log_likelihood = h.log_merged;
-  PredictionChain chain(prior_);
+  evidence.log_likelihood = h.log_merged + std::log(h.prior->probability);
+  PredictionChain chain(prior_, *h.prior->S);
   std::vector<int> open;
   for (const int f : features) {
     const int m = h.match[slot(f)];

@@ -15,28 +15,39 @@ constexpr double kTouchedMs = 6e-5;  ///< modelled cost of a child, for each fea
 
 }  // namespace
 
-Mixture::Mixture(const ProperPrior& prior, const Joint& joint, BudgetedSearch& budgeted,
-                 std::vector<SearchLikelihood> likelihoods, const MatchOptions& options)
+Mixture::Mixture(const ProperPrior& prior, const std::vector<PriorGaussian>& gaussians,
+                 BudgetedSearch& budgeted, std::vector<SearchLikelihood> likelihoods,
+                 const MatchOptions& options)
     : prior_(prior),
-      joint_(joint),
       search_(budgeted),
       options_(options),
       likelihoods_(std::move(likelihoods)) {
-  Hypothesis root;
-  const std::size_t size = slot(joint.size());
-  root.joint = joint.prior();
-  root.mean.resize(size);
-  root.match.assign(size, -1);
-  root.match_probability.assign(size, 1.0);
-  root.ancestry.assign(size, -1);
-  root.candidate_of.assign(size, -1);
-  for (int f = 0; f < joint.size(); ++f) {
-    valid_.push_back(budgeted.validArea(f));
-    root.mean[slot(f)] = prior.mean(f);
-    addCandidate(root, f);
+  const std::size_t size = slot(prior.size());
+  for (int f = 0; f < prior.size(); ++f) valid_.push_back(budgeted.validArea(f));
+  first_prior_ = &gaussians.front();
+  for (const PriorGaussian& gaussian : gaussians) {
+    Hypothesis root;
+    root.prior = &gaussian;
+    root.joint = gaussian.joint->prior();
+    root.weight = root.most_weight = gaussian.probability;
+    root.log_weight = std::log(gaussian.probability);
+    root.mean.resize(size);
+    root.match.assign(size, -1);
+    root.match_probability.assign(size, 1.0);
+    root.ancestry.assign(size, -1);
+    root.candidate_of.assign(size, -1);
+    for (int f = 0; f < prior.size(); ++f) {
+      root.mean[slot(f)] = prior.mean(f);
+      addCandidate(root, f);
+    }
+    if (hypotheses_.empty()) {
+      beginTerms(root);
+    } else {
+      root.id = next_id_++;
+      for (PairTable& pairs : pairs_) root.entry.push_back(pairs.acquire());
+    }
+    hypotheses_.push_back(std::move(root));
   }
-  beginTerms(root);
-  hypotheses_.push_back(std::move(root));
 }
 
 int Mixture::heaviest() const {
@@ -198,7 +209,8 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, const Child& born) {
   const int match = born.match;
   Hypothesis child;
   child.parent = parent.id;
-  child.joint = joint_.measure(parent.joint, f);
+  child.prior = parent.prior;
+  child.joint = parent.prior->joint->measure(parent.joint, f);
   child.mean = parent.mean;
   child.match = parent.match;
   child.match_probability = parent.match_probability;
@@ -221,7 +233,7 @@ Hypothesis Mixture::spawn(const Hypothesis& parent, int f, const Child& born) {
     if (!is_changed[slot(known.feature)]) child.pixel_masses.push_back(known);
   child.candidate_of.assign(child.mean.size(), -1);
   child.candidates.reserve(parent.candidates.size());
-  for (int t = 0; t < joint_.size(); ++t) {
+  for (int t = 0; t < features(); ++t) {
     if (child.isFused(t)) continue;
     if (is_changed[slot(t)]) {
       addCandidate(child, t);

@@ -37,6 +37,13 @@ struct SearchLikelihood {
 /// each is searched to completion.
 constexpr double kAlternativeWeight = 0.1;
 
+/// One Gaussian of the prior: its joint over the features, and its probability.
+struct PriorGaussian {
+  const Joint* joint = nullptr;
+  const Eigen::MatrixXd* S = nullptr;  ///< what the joint represents
+  double probability = 1.0;
+};
+
 /// One Gaussian of the mixture: a data-association hypothesis, and its prediction of the features
 /// that are not matched yet.
 struct Hypothesis {
@@ -64,6 +71,7 @@ struct Hypothesis {
   double most_weight = 1.0;  ///< largest weight so far
   bool was_searched = false;
   double log_merged = 0.0;  ///< what merged siblings added to log_weight
+  const PriorGaussian* prior = nullptr;  ///< that it descends from
   std::shared_ptr<const Conditional> joint;
   std::vector<Eigen::Vector2d> mean;      ///< F, the match for a fused feature [px]
   std::vector<int> match;                 ///< F, -1: not fused
@@ -97,11 +105,13 @@ struct Explanation {
 /// S_k)`, over any representation of the joint, with the two rules of update.
 class Mixture {
  public:
-  /// All but the likelihoods must outlive it.
-  Mixture(const ProperPrior& prior, const Joint& joint, BudgetedSearch& budgeted,
-          std::vector<SearchLikelihood> likelihoods, const MatchOptions& options);
+  /// All but the likelihoods must outlive it. `gaussians`: of the prior, at least one, with
+  /// probabilities that sum to one.
+  Mixture(const ProperPrior& prior, const std::vector<PriorGaussian>& gaussians,
+          BudgetedSearch& budgeted, std::vector<SearchLikelihood> likelihoods,
+          const MatchOptions& options);
 
-  int features() const { return joint_.size(); }
+  int features() const { return prior_.size(); }
   /// In order of creation, weights normalised.
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   /// Index of the heaviest (ties: the lower id).
@@ -162,6 +172,7 @@ class Mixture {
     return options_.joint_rescoring && options_.update_rule == UpdateRule::kIncremental;
   }
 
+  const PriorGaussian* firstPrior() const { return first_prior_; }
   int mostGaussians() const { return most_gaussians_; }
   bool wasCapped() const { return was_capped_; }
 
@@ -223,7 +234,6 @@ class Mixture {
   void complete(PairTerm& term, const Hypothesis::Candidate& candidate, double child) const;
 
   const ProperPrior& prior_;
-  const Joint& joint_;
   BudgetedSearch& search_;
   const MatchOptions& options_;
   std::vector<SearchLikelihood> likelihoods_;
@@ -238,6 +248,7 @@ class Mixture {
   std::vector<std::vector<FusedEntry>> fused_entries_;  // by feature and match
   bool keeps_terms_ = true;
   PairTerm scratch_;  // of a Gaussian without an entry
+  const PriorGaussian* first_prior_ = nullptr;
   int next_id_ = 1;
   int most_gaussians_ = 1;
   bool was_capped_ = false;

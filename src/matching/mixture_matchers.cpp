@@ -16,6 +16,12 @@ namespace {
 /// it does so too where chow_liu would not halve the time, as with less than about 130 features.
 constexpr double kAutoMs = 10.0;
 
+void addWide(const Joint& joint, const Eigen::MatrixXd& S, double probability,
+             std::vector<PriorGaussian>* gaussians) {
+  gaussians->front().probability = 1.0 - probability;
+  gaussians->push_back({&joint, &S, probability});
+}
+
 MatchResult matchDense(const MeasurementPrior& given, FeatureSearch& search,
                        const MatchOptions& options, MixtureRun::Policy policy, const char* name) {
   ProperPrior prior(given);
@@ -30,30 +36,45 @@ MatchResult matchDense(const MeasurementPrior& given, FeatureSearch& search,
   if (prior.size() > 0) {
     const auto joint =
         makeDenseJoint(prior.S(), information.precision_determinant, given.noise_variance_px2);
+    std::vector<PriorGaussian> gaussians = {{joint.get(), &prior.S(), 1.0}};
+    const Eigen::MatrixXd wide_S = prior.wideS();
+    std::unique_ptr<Joint> wide;
+    if (wide_S.rows() > 0) {
+      const FeatureInformation of_wide = featureInformation(wide_S);
+      if (of_wide.regularisation == 0.0) {
+        wide = makeDenseJoint(wide_S, of_wide.precision_determinant, given.noise_variance_px2);
+        addWide(*wide, wide_S, prior.wideProbability(), &gaussians);
+      }
+    }
     result.statistics.information_ms = 1e3 * (budgeted.now() - start);
-    MixtureRun(given, prior, *joint, budgeted, options, policy).run(result);
+    MixtureRun(given, prior, gaussians, budgeted, options, policy).run(result);
   }
   budgeted.finish(result);
   return result;
+}
+
+/// A feature of the tree that a neighbour determines exactly; -1: none.
+int dependentFeature(const ChowLiuTree& tree) {
+  constexpr double kSingular = 1e-11;
+  for (std::size_t e = 0; e < tree.edges.size(); ++e) {
+    const auto i = static_cast<std::size_t>(tree.edges[e].first);
+    const auto j = static_cast<std::size_t>(tree.edges[e].second);
+    const Eigen::Matrix2d& cross = tree.cross_covariances[e];
+    const Eigen::Matrix2d conditional =
+        tree.marginals[j] - cross.transpose() * tree.marginals[i].inverse() * cross;
+    const bool proper =
+        isProperCovariance(conditional) &&
+        (conditional.diagonal().array() > kSingular * tree.marginals[j].diagonal().array()).all();
+    if (!proper) return tree.edges[e].second;
+  }
+  return -1;
 }
 
 /// The tree of the prior, without features that a neighbour determines exactly.
 ChowLiuTree properTree(ProperPrior& prior) {
   while (true) {
     ChowLiuTree tree = chowLiuTree(prior.S());
-    int dependent = -1;
-    for (std::size_t e = 0; e < tree.edges.size() && dependent < 0; ++e) {
-      const auto i = static_cast<std::size_t>(tree.edges[e].first);
-      const auto j = static_cast<std::size_t>(tree.edges[e].second);
-      const Eigen::Matrix2d& cross = tree.cross_covariances[e];
-      const Eigen::Matrix2d conditional =
-          tree.marginals[j] - cross.transpose() * tree.marginals[i].inverse() * cross;
-      constexpr double kSingular = 1e-11;
-      const bool proper =
-          isProperCovariance(conditional) &&
-          (conditional.diagonal().array() > kSingular * tree.marginals[j].diagonal().array()).all();
-      if (!proper) dependent = tree.edges[e].second;
-    }
+    const int dependent = dependentFeature(tree);
     if (dependent < 0) return tree;
     prior.leaveOut(dependent);
   }
@@ -105,8 +126,18 @@ MatchResult ChowLiuMatcher::match(const MeasurementPrior& given, FeatureSearch& 
     result.tree_edges.emplace_back(prior.original(edge.first), prior.original(edge.second));
   if (prior.size() > 0) {
     const auto joint = makeTreeJoint(tree, given.noise_variance_px2);
+    std::vector<PriorGaussian> gaussians = {{joint.get(), &prior.S(), 1.0}};
+    const Eigen::MatrixXd wide_S = prior.wideS();
+    std::unique_ptr<Joint> wide;
+    if (wide_S.rows() > 0) {
+      const ChowLiuTree wide_tree = chowLiuTree(wide_S);
+      if (dependentFeature(wide_tree) < 0) {
+        wide = makeTreeJoint(wide_tree, given.noise_variance_px2);
+        addWide(*wide, wide_S, prior.wideProbability(), &gaussians);
+      }
+    }
     result.statistics.tree_ms = 1e3 * (budgeted.now() - start);
-    MixtureRun(given, prior, *joint, budgeted, options, MixtureRun::Policy::kFull).run(result);
+    MixtureRun(given, prior, gaussians, budgeted, options, MixtureRun::Policy::kFull).run(result);
   }
   budgeted.finish(result);
   return result;

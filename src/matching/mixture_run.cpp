@@ -31,13 +31,14 @@ double informationLeft(const Hypothesis& h, const std::vector<int>& match) {
 
 }  // namespace
 
-MixtureRun::MixtureRun(const MeasurementPrior& given, const ProperPrior& prior, const Joint& joint,
-                       BudgetedSearch& budgeted, const MatchOptions& options, Policy policy)
+MixtureRun::MixtureRun(const MeasurementPrior& given, const ProperPrior& prior,
+                       const std::vector<PriorGaussian>& gaussians, BudgetedSearch& budgeted,
+                       const MatchOptions& options, Policy policy)
     : prior_(prior),
       search_(budgeted),
       options_(options),
       policy_(policy),
-      mixture_(prior, joint, budgeted, likelihoodsOf(given, prior, options), options),
+      mixture_(prior, gaussians, budgeted, likelihoodsOf(given, prior, options), options),
       choice_(mixture_, options.update_rule == UpdateRule::kIncremental),
       random_(options.seed) {}
 
@@ -200,6 +201,7 @@ void MixtureRun::report(MatchResult& result) const {
                                            : mixture_.explanations();
   const Explanation& accepted = all.front();
   MatchStatistics& statistics = result.statistics;
+  result.is_wide = accepted.hypothesis->prior != mixture_.firstPrior();
   statistics.max_gaussians = mixture_.mostGaussians();
   statistics.accepted_weight = accepted.probability;
   statistics.information_bits_end = informationLeft(*accepted.hypothesis, accepted.match);

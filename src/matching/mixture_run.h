@@ -15,9 +15,10 @@ class MixtureRun {
  public:
   enum class Policy { kFull, kFast };
 
-  /// `given` is the prior as handed in, `prior` its proper part.
-  MixtureRun(const MeasurementPrior& given, const ProperPrior& prior, const Joint& joint,
-             BudgetedSearch& budgeted, const MatchOptions& options, Policy policy);
+  /// `given` is the prior as handed in, `prior` its proper part, `gaussians` what represents it:
+  /// one, or its wide one besides; they must outlive the run.
+  MixtureRun(const MeasurementPrior& given, const ProperPrior& prior,
+             const std::vector<PriorGaussian>& gaussians, BudgetedSearch& budgeted, const MatchOptions& options, Policy policy);
 
   /// Runs, and fills the result (but for what BudgetedSearch::finish writes).
   void run(MatchResult& result);

@@ -137,7 +137,7 @@ void Mixture::searchAndUpdate(int g, int c, MatchStep& step) {
 void Mixture::mergeSiblings(int g, int f, std::vector<Child>& children) const {
   if (children.size() < 2 || !(options_.merge_sigmas > 0.0)) return;
   const Hypothesis& parent = hypotheses_[slot(g)];
-  const auto joint = joint_.measure(parent.joint, f);
+  const auto joint = parent.prior->joint->measure(parent.joint, f);
   const std::vector<int>& touched = joint->touched();
   std::vector<Eigen::Matrix2d> gains, precisions;
   for (std::size_t i = 0; i < touched.size(); ++i) {

@@ -56,6 +56,13 @@ ProperPrior::ProperPrior(const MeasurementPrior& prior)
   if (static_cast<int>(kept.size()) < size()) take(kept);
 }
 
+Eigen::MatrixXd ProperPrior::wideS() const {
+  if (!(prior_.wide_probability > 0.0) || prior_.wide_S.rows() != prior_.z.size() ||
+      !prior_.wide_S.allFinite())
+    return {};
+  return selectFeatures(prior_.wide_S, original_);
+}
+
 void ProperPrior::leaveOutDependent() { take(independentFeatures(*S_)); }
 
 void ProperPrior::leaveOut(int feature) {

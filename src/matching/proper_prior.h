@@ -22,6 +22,9 @@ class ProperPrior {
   int original(int feature) const { return original_[static_cast<std::size_t>(feature)]; }
   const Eigen::VectorXd& z() const { return *z_; }
   const Eigen::MatrixXd& S() const { return *S_; }
+  /// Of the prior's wide Gaussian, made anew; without rows when it has none.
+  Eigen::MatrixXd wideS() const;
+  double wideProbability() const { return prior_.wide_probability; }
   Eigen::Vector2d mean(int feature) const { return z_->segment<2>(2 * feature); }
   Eigen::Matrix2d covariance(int feature) const {
     return S_->block<2, 2>(2 * feature, 2 * feature);

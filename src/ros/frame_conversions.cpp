@@ -60,6 +60,10 @@ ams_msgs::TrackingState toTrackingStateMsg(const TrackedFrame& frame,
   message.scale_source_name = scaleSourceName(frame.scale_source);
   message.resets = frame.resets;
   message.times_lost = frame.times_lost;
+  message.map = frame.map;
+  message.jumps = frame.jumps;
+  message.quality = static_cast<float>(finiteOrZero(frame.quality));
+  message.quality_reason = frame.quality_reason;
   return message;
 }
 
@@ -103,6 +107,9 @@ ams_msgs::MatchingStatistics toStatisticsMsg(const TrackedFrame& frame,
   message.information_bits_left = finiteOrZero(matching.information_bits_end);
   message.nis = finiteOrZero(frame.nis);
   message.nis_degrees = frame.nis_degrees;
+  message.quality = finiteOrZero(frame.quality);
+  message.acceleration_mps2 = frame.accelerations.linear_mps2;
+  message.angular_acceleration_rps2 = frame.accelerations.angular_rps2;
   message.match_sigma_px = frame.match_sigma_px;
   message.readout_s = frame.camera.readout_s;
   message.lens_focal = frame.camera.lens.focal;

@@ -42,6 +42,9 @@ void NodeDiagnostics::record(const TrackedFrame& frame, double latency_s, double
   matcher_ = frame.matching.statistics.matcher;
   resets_ = frame.resets;
   times_lost_ = frame.times_lost;
+  map_ = frame.map;
+  quality_ = frame.quality;
+  quality_reason_ = frame.quality_reason;
 }
 
 void NodeDiagnostics::recordFault(const std::string& fault) {
@@ -83,7 +86,9 @@ void NodeDiagnostics::reportTracking(Status& status) {
       status.summary(DiagnosticStatus::ERROR, "lost" + because);
       break;
     case TrackingState::kTracking:
-      if (nis_ratio > 3.0)
+      if (!quality_reason_.empty())
+        status.summary(DiagnosticStatus::WARN, "tracking, but not to be trusted: " + quality_reason_);
+      else if (nis_ratio > 3.0)
         status.summary(DiagnosticStatus::WARN, "tracking, but matches disagree with the filter");
       else
         status.summary(DiagnosticStatus::OK, "tracking" + because);
@@ -100,6 +105,8 @@ void NodeDiagnostics::reportTracking(Status& status) {
   status.addf("NIS by its degrees of freedom (1 when consistent)", "%.2f", nis_ratio);
   status.add("resets", resets_);
   status.add("times lost", times_lost_);
+  status.add("map", map_);
+  status.addf("quality, 0 to 1", "%.2f", quality_);
 }
 
 void NodeDiagnostics::forgetInterval() {

@@ -117,17 +117,21 @@ void TrackerRos::publish(const TrackedFrame& frame, const CameraImage& image) {
 
 void TrackerRos::noticeChanges(const TrackedFrame& frame, const ros::Time& stamp) {
   const bool time_jumped = frame.stamp_s < last_stamp_s_;
-  if (session_.generation() != generation_ || frame.resets != resets_) {
+  if (session_.generation() != generation_ || frame.resets != resets_ ||
+      frame.map != map_) {
     if (time_jumped)
       restart_warning_.say("time", "Time ran back by " +
                                        std::to_string(last_stamp_s_ - frame.stamp_s) +
                                        " s (a looped bag?): started anew");
+    else if (frame.resets == resets_ && session_.generation() == generation_)
+      ROS_WARN_STREAM("The pose is in map " << frame.map << " from here on: " << frame.reason);
     else if (session_.generation() == generation_ && reset_cause_.empty())
       restart_warning_.say("Started anew" + (frame.reason.empty() ? "" : ": " + frame.reason));
     forgetPast(time_jumped);
   }
   generation_ = session_.generation();
   resets_ = frame.resets;
+  map_ = frame.map;
   reset_cause_.clear();
   last_stamp_s_ = stamp.toSec();
   if (frame.state == state_) return;

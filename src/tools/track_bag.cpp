@@ -156,6 +156,10 @@ void printSummary(const RunSummary& s, const std::string& output) {
     if (value) std::printf(", %s %.1f %s", name.c_str(), factor * *value, unit);
   };
   std::printf("%d of %d frames tracked, lost %d times", s.frames_tracked, s.frames, s.times_lost);
+  if (s.resets > 0) std::printf(", started anew %d times", s.resets);
+  if (s.maps > 1)
+    std::printf(", in %d maps, of which number %d has %d frames and the errors stated", s.maps,
+                s.main_map, s.frames_in_main_map);
   print("ATE Sim(3)", s.ate_sim3_m, 1000.0, "mm");
   print("ATE SE(3)", s.ate_se3_m, 1000.0, "mm");
   print("NEES", s.nees_mean, 1.0, "of 6");
@@ -163,6 +167,8 @@ void printSummary(const RunSummary& s, const std::string& output) {
   if (!s.durations.empty())
     std::printf(", %.1f ms a frame (99 %%: %.1f)", s.durations.back().median_ms,
                 s.durations.back().p99_ms);
+  if (s.frames_tracked > 0) std::printf("\nquality %.2f", s.quality);
+  if (!s.quality_reason.empty()) std::printf(": %s", s.quality_reason.c_str());
   std::printf("\nwritten to %s\n", output.c_str());
 }
 

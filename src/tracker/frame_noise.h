@@ -9,8 +9,8 @@
 
 namespace active_matching_slam {
 
-/// Noise of the tracker's landmarks and matches: process noise of the former, R of the latter, which
-/// is learnt from the updates' residuals (MeasurementNoise).
+/// Noise of the tracker's landmarks and matches: process noise of the former, R of the latter,
+/// which is learnt from the updates' residuals (MeasurementNoise).
 class FrameNoise {
  public:
   explicit FrameNoise(const FilterOptions& options) : options_(options), noise_(options) {}
@@ -38,6 +38,8 @@ class FrameNoise {
 
   /// Standard deviation per axis [px] of a typical match in the last image.
   double typicalSigma_px() const { return noise_.typicalSigma_px(); }
+  /// MeasurementNoise::varianceFactor().
+  double varianceFactor() const { return noise_.varianceFactor(); }
 
  private:
   FilterOptions options_;

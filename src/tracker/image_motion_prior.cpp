@@ -3,6 +3,9 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "active_matching_slam/information/gaussian_information.h"
+#include "active_matching_slam/matching/innovation_gate.h"
+
 namespace active_matching_slam {
 namespace {
 
@@ -11,6 +14,7 @@ namespace {
 /// Derivation: where half of the image moves by one motion and half by another, the alignment takes
 /// either, each one standard deviation off the mean; half of that is between this and none.
 constexpr double kSpreadFraction = 0.5;
+constexpr double kFlowGateChi2 = 13.8;  ///< Standard: chi-square, 99.9 % of 2 degrees of freedom
 
 }  // namespace
 
@@ -77,6 +81,38 @@ MeasurementPrior conditionOnImageMotion(
   const Eigen::LLT<Eigen::Matrix3d> measured(f * V + noise);
   conditioned.z += f * PA * measured.solve(common);
   const Eigen::Matrix3Xd root = f * measured.matrixL().solve(PA.transpose());
+  conditioned.S -= root.transpose() * root;
+  return conditioned;
+}
+
+std::optional<MeasurementPrior> conditionOnFlow(
+    const MeasurementPrior& prior, const std::vector<std::optional<Eigen::Vector2d>>& flow_px,
+    double sigma_px) {
+  std::vector<int> tracked;
+  for (int i = 0; i < prior.size(); ++i)
+    if (flow_px[i]) tracked.push_back(i);
+  Eigen::VectorXd innovation(2 * static_cast<int>(tracked.size()));
+  for (std::size_t k = 0; k < tracked.size(); ++k)
+    innovation.segment<2>(2 * k) = *flow_px[tracked[k]] - prior.mean(tracked[k]);
+  Eigen::MatrixXd S = selectFeatures(prior.S, tracked);
+  S.diagonal().array() += sigma_px * sigma_px - prior.noise_variance_px2;
+  const std::vector<int> kept = leaveOneOutInliers(innovation, S, kFlowGateChi2);
+  if (2 * static_cast<int>(kept.size()) <= prior.size()) return std::nullopt;
+
+  const int n = 2 * static_cast<int>(kept.size());
+  Eigen::MatrixXd PA(prior.S.rows(), n);
+  Eigen::VectorXd kept_innovation(n);
+  for (int k = 0; k < n / 2; ++k) {
+    const int i = tracked[kept[k]];
+    PA.middleCols<2>(2 * k) = prior.S.middleCols<2>(2 * i);
+    PA.block<2, 2>(2 * i, 2 * k).diagonal().array() -= prior.noise_variance_px2;
+    kept_innovation.segment<2>(2 * k) = innovation.segment<2>(2 * kept[k]);
+  }
+  const Eigen::LLT<Eigen::MatrixXd> factor(selectFeatures(S, kept));
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  MeasurementPrior conditioned = prior;
+  conditioned.z += PA * factor.solve(kept_innovation);
+  const Eigen::MatrixXd root = factor.matrixL().solve(PA.transpose());
   conditioned.S -= root.transpose() * root;
   return conditioned;
 }

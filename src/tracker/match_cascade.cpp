@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "active_matching_slam/image/feature_flow.h"
 #include "active_matching_slam/image/image_motion.h"
 #include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/false_alarm.h"
@@ -31,14 +32,26 @@ double expectedMatches(const FrameState& frame) {
   return std::accumulate(frame.match_probabilities.begin(), frame.match_probabilities.end(), 0.0);
 }
 
-/// The prior given how the image as a whole moved since the reference image. Empty when that is
-/// unknown.
-std::optional<MeasurementPrior> guidedPrior(const FrameState& frame) {
+/// `prior` given how the features moved in the image since the reference image, or else how it
+/// moved as a whole. Empty when both are unknown.
+std::optional<MeasurementPrior> guidedPrior(const FrameState& frame,
+                                            const MeasurementPrior& prior) {
   if (frame.reference_image.size() != frame.image.size()) return std::nullopt;
+  const auto flow_px = trackPoints(frame.reference_image, frame.image, frame.reference_px);
+  if (auto guided = conditionOnFlow(prior, flow_px, flowSigma_px(frame.image.cols))) return guided;
   const auto motion = estimateImageMotion(frame.reference_image, frame.image,
-                                          predictedImageMotion(frame.prior, frame.reference_px));
+                                          predictedImageMotion(prior, frame.reference_px));
   if (!motion) return std::nullopt;
-  return conditionOnImageMotion(frame.prior, frame.reference_px, *motion);
+  return conditionOnImageMotion(prior, frame.reference_px, *motion);
+}
+
+/// The prior of a frame in which the camera jerks.
+MeasurementPrior jerkPrior(const FrameState& frame) {
+  MeasurementPrior prior = frame.prior;
+  prior.wide_probability = 0.0;
+  prior.wide_S.resize(0, 0);
+  if (frame.jerk_px.cols() > 0) prior.S += frame.jerk_px * frame.jerk_px.transpose();
+  return prior;
 }
 
 }  // namespace
@@ -79,48 +92,65 @@ void MatchCascade::match(const MatchOptions& matching, bool fallbacks, FrameStat
 void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* frame) {
   const double scale = pixelScale(frame->image.cols, frame->image.rows);
   const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2 * scale * scale;
-  const auto guided = is_wide ? guidedPrior(*frame) : std::nullopt;
-  const MeasurementPrior& prior = guided ? *guided : frame->prior;
-  frame->matching = matcher_->match(prior, frame->search,
+  const bool can_jerk = frame->jerk_px.size() > 0 && !frame->jerk_px.isZero();
+  const auto guided = is_wide ? guidedPrior(*frame, frame->prior) : std::nullopt;
+  if (can_jerk && !guided) {
+    frame->prior.wide_S = jerkPrior(*frame).S;
+    frame->prior.wide_probability = frame->jerk_probability;
+  }
+  frame->matching = matcher_->match(guided ? *guided : frame->prior, frame->search,
                                     withBudget(matching, options_.first_budget_fraction, *frame));
+  bool is_jerk = frame->matching.is_wide;
+  if (expectedMatches(*frame) >= options_.minimum_expected && isPoor(*frame)) {
+    const MeasurementPrior jerk = jerkPrior(*frame);
+    const bool is_tried = is_wide && !can_jerk;
+    const auto guided_jerk = is_tried ? guided : guidedPrior(*frame, jerk);
+    const MeasurementPrior& wide = guided_jerk ? *guided_jerk : jerk;
+    if (!is_tried && (guided_jerk || can_jerk)) is_jerk |= retry(matching, wide, frame);
+    if (frame->poor_frames <= options_.maximum_poor_frames)
+      is_jerk |= tryConsensusMatchers(matching, wide, frame);
+  }
+  if (is_jerk && can_jerk) {
+    frame->is_jerk = true;
+    frame->prior = jerkPrior(*frame);
+  }
   if (expectedMatches(*frame) < options_.minimum_expected) return;
-  if (!is_wide && isPoor(*frame)) retryGuided(matching, frame);
-  if (frame->poor_frames <= options_.maximum_poor_frames)
-    tryConsensusMatchers(matching, prior, frame);
   if (!isFalseAlarm(*frame)) return;
   MatchResult& result = frame->matching;
   std::fill(result.match_of_feature.begin(), result.match_of_feature.end(), -1);
   result.statistics.matched = 0;
 }
 
-void MatchCascade::retryGuided(const MatchOptions& matching, FrameState* frame) {
-  const auto guided = guidedPrior(*frame);
-  if (!guided) return;
+bool MatchCascade::retry(const MatchOptions& matching, const MeasurementPrior& prior,
+                         FrameState* frame) const {
   ImageFeatureSearch search = frame->search;
   search.beginFrame(frame->image, frame->templates, frame->sources);
   const double minimum_matches =
       std::max(options_.replacing_ratio * frame->matching.statistics.matched,
                options_.majority_fraction * expectedMatches(*frame));
-  if (tryFallback({*matcher_, *guided, search, options_.fallback_budget_fraction, minimum_matches},
-                  matching, frame))
-    frame->search = std::move(search);
+  if (!tryFallback({*matcher_, prior, search, options_.fallback_budget_fraction, minimum_matches},
+                   matching, frame))
+    return false;
+  frame->search = std::move(search);
+  return true;
 }
 
 /// Both search the gates of `prior`: what has been searched there need not be again.
-void MatchCascade::tryConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
-                                        FrameState* frame) {
+bool MatchCascade::tryConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
+                                        FrameState* frame) const {
   const double expected = expectedMatches(*frame);
   const auto matched = [frame] { return double(frame->matching.statistics.matched); };
   if (isPoor(*frame) &&
       tryFallback({*jcbb_, prior, frame->search, options_.fallback_budget_fraction,
                    std::max(matched(), options_.majority_fraction * expected), options_.jcbb_nis},
                   matching, frame))
-    return;
-  if (matched() > options_.poor_fraction * expected) return;
-  tryFallback({*ransac_, prior, frame->search, 1.0,
-               std::max(options_.replacing_ratio * matched(), options_.minimum_fraction * expected),
-               options_.ransac_nis},
-              matching, frame);
+    return true;
+  if (matched() > options_.poor_fraction * expected) return false;
+  return tryFallback(
+      {*ransac_, prior, frame->search, 1.0,
+       std::max(options_.replacing_ratio * matched(), options_.minimum_fraction * expected),
+       options_.ransac_nis},
+      matching, frame);
 }
 
 /// Whether its result replaced the present one. What it used of the budget is added either way.

@@ -67,6 +67,11 @@ void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->retired_total = map_.retiredTotal();
   frame->resets = resets_;
   frame->times_lost = times_lost_;
+  frame->map = map_number_;
+  frame->jumps = jumps_;
+  frame->quality = quality_.quality();
+  frame->quality_reason = quality_.cause();
+  frame->accelerations = motion_noise_.expected();
   for (const MapFeature& feature : map_.features()) {
     const FeatureState& state = *filter_.find(feature.id);
     TrackedFeature out;

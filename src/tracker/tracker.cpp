@@ -30,8 +30,22 @@ class StopWatch {
 }  // namespace
 
 void Tracker::Implementation::reset(const std::string& reason) {
+  lost_maps_.clear();
+  awaits_loaded_map_ = false;
+  abandonMap(reason);
+}
+
+/// The next image begins another map. Those in which the camera was lost before are kept.
+void Tracker::Implementation::abandonMap(const std::string& reason) {
+  clearMap();
   state_ = TrackingState::kWaiting;
   reason_ = reason;
+  map_number_ = maps_begun_++;
+  ++resets_;
+  ++jumps_;
+}
+
+void Tracker::Implementation::clearMap() {
   map_.clear();
   map_monitor_.reset();
   initialiser_.end();
@@ -39,10 +53,11 @@ void Tracker::Implementation::reset(const std::string& reason) {
   structure_snapshot_ = {};
   filter_.reset(CameraState(), MotionCovariance::Zero());
   noise_.reset();
+  motion_noise_.reset();
+  quality_.reset();
   scale_source_ = ScaleSource::kFree;
   previous_image_.release();
   poor_frames_ = 0;
-  ++resets_;
 }
 
 void Tracker::Implementation::setOptions(const TrackerOptions& options) {
@@ -56,6 +71,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
   cascade_.setOptions(options.matcher, options.cascade);
   filter_.setOptions(withTrustIn(camera_.calibration(), options.filter));
   noise_.setOptions(options.filter);
+  motion_noise_.setOptions(options.filter);
   relocaliser_ = Relocaliser(options.relocaliser, options.map, options.image);
   options_ = options;
 }
@@ -64,6 +80,7 @@ void Tracker::Implementation::setScale(double factor) {
   if (!(factor > 0.0) || !std::isfinite(factor))
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   filter_.rescale(factor);
+  motion_noise_.rescale(factor);
   map_.rescale(factor);
   initialiser_.rescale(factor);
   T_world_reference_.translation() *= factor;
@@ -159,6 +176,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   }
   previous_image_ = image.clone();  // the caller may use its memory again
   if (poor_frames_ == 0) reference_image_ = previous_image_;
+  if (lookForOtherMaps(image, frame.get())) current.reset();
   frame->state = state_;
   if (!reason_.empty()) frame->reason = reason_;
   describeState(frame.get());

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "active_matching_slam/filter/motion_noise.h"
 #include "active_matching_slam/image/working_size.h"
 #include "active_matching_slam/information/map_structure.h"
 #include "active_matching_slam/initialisation/initialiser.h"
@@ -14,6 +15,7 @@
 #include "active_matching_slam/tracker/frame_state.h"
 #include "active_matching_slam/tracker/match_cascade.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "active_matching_slam/tracker/tracking_quality.h"
 #include "frame_noise.h"
 
 namespace active_matching_slam {
@@ -34,6 +36,7 @@ class Tracker::Implementation {
         options_(options),
         filter_(withTrustIn(camera_.calibration(), options.filter)),
         noise_(options.filter),
+        motion_noise_(options.filter),
         cascade_(options.matcher, options.cascade),
         relocaliser_(options.relocaliser, options.map, options.image) {
     checkTrackerOptions(options);
@@ -62,11 +65,17 @@ class Tracker::Implementation {
   static std::vector<FeatureMeasurement> selectMeasurements(const FrameState& current);
   void learnSlopes(const FrameState& current);
   void recordSearches(const FrameState& current, std::int64_t index);
+  void judgeQuality(const FrameState& current);
   bool giveUpWrongMap(const FrameState& current, TrackedFrame* frame);
   void updateTrackingState(const FrameState& current);
   void lose(const std::string& reason);
   void relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame);
   bool relocalise(const cv::Mat& image, TrackedFrame* frame);
+  void placeCamera(const Relocalisation& found, TrackedFrame* frame);
+  bool beginNewMap(const cv::Mat& image, TrackedFrame* frame);
+  bool lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame);
+  void abandonMap(const std::string& reason);
+  void clearMap();
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
@@ -83,11 +92,26 @@ class Tracker::Implementation {
   void describeState(TrackedFrame* frame) const;
   static void describeMatches(FrameState current, TrackedFrame* frame);
 
+  /// All that is kept of a map while the camera is in another.
+  struct LostMap {
+    int number;
+    double lost_stamp_s;
+    Ekf filter;
+    FrameNoise noise;
+    FeatureMap map;
+    MapMonitor monitor;
+    ScaleSource scale_source;
+  };
+  LostMap storeMap();
+  void takeMap(LostMap stored);
+
   WorkingSize working_;
   CameraModel camera_;  ///< of images of the working size
   TrackerOptions options_;
   Ekf filter_;
   FrameNoise noise_;
+  MotionNoise motion_noise_;
+  TrackingQuality quality_;
   Initialiser initialiser_;
   FeatureMap map_;
   MapMonitor map_monitor_;
@@ -95,6 +119,13 @@ class Tracker::Implementation {
   Relocaliser relocaliser_;
   MapStructure structure_;
   MapStructure::Snapshot structure_snapshot_;
+
+  std::vector<LostMap> lost_maps_;  ///< the one that was lost last at the end
+  std::size_t next_lost_map_ = 0;   ///< to be looked for
+  double last_look_stamp_s_ = 0.0;  ///< when one was looked for
+  int map_number_ = 0, maps_begun_ = 1;
+  bool awaits_loaded_map_ =
+      false;  ///< the camera has not been found yet in the map that was loaded
 
   TrackingState state_ = TrackingState::kWaiting;
   std::string reason_;
@@ -107,7 +138,7 @@ class Tracker::Implementation {
   double state_stamp_s_ = 0.0;  ///< of the filter's state
   double lost_stamp_s_ = 0.0;   ///< when the camera was lost
   std::int64_t images_ = 0;
-  int resets_ = 0, times_lost_ = 0;
+  int resets_ = 0, times_lost_ = 0, jumps_ = 0;
   int poor_frames_ = 0;  ///< with too few matches, in a row
 };
 

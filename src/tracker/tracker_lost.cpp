@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "active_matching_slam/image/image_quality.h"
 #include "active_matching_slam/map/map_file.h"
@@ -12,25 +14,25 @@ namespace {
 /// Derivation: vague, ten times and more what inliers of some pixels leave open (about 1 % of the
 /// depth, 0.01 rad), so that the update by the inliers determines the pose.
 constexpr double kRelocalisedSigmaPosition = 0.2, kRelocalisedSigmaRotation = 0.1;
+/// Time between two looks for the camera in maps in which it was lost, while it is tracked in
+/// another [s]. Cost: a look takes as long as a frame or two.
+constexpr double kLookPeriodS = 0.5;
+constexpr std::size_t kMostLostMaps = 4;  ///< Cost: memory, and time until each is looked in again
 
 }  // namespace
 
-/// Starts anew when the map has turned out wrong. One that was right before is kept, and the camera
-/// looked for in it.
+/// Starts anew when the map has turned out wrong. One that was right before is kept: there, few
+/// matches mean that the scene, or the view of it, has changed.
 bool Tracker::Implementation::giveUpWrongMap(const FrameState& current, TrackedFrame* frame) {
   if (current.matching.statistics.cut_short) return false;  // not all was looked for
   map_monitor_.add(last_stamp_s_, current.prior.size(),
                    static_cast<int>(current.measurements.size()),
                    measureImageQuality(current.image).sharpness);
-  if (!map_monitor_.isWrong()) return false;
-  if (map_monitor_.hasBeenRight()) {
-    lose("half of what the map predicts does not match in images as sharp as ever");
-    return true;
-  }
+  if (!map_monitor_.isWrong() || map_monitor_.hasBeenRight()) return false;
   const std::string reason =
       "the map is wrong: half of what it predicts does not match in images as sharp as ever; "
       "started anew";
-  reset(reason);
+  abandonMap(reason);
   start(current.image, frame);
   frame->reason = reason;
   return true;
@@ -47,6 +49,8 @@ void Tracker::Implementation::updateTrackingState(const FrameState& current) {
   }
   ++poor_frames_;
   std::ostringstream reason;
+  if (current.matching.statistics.cut_short)
+    reason << "out of time after " << current.matching.statistics.searches << " searches: ";
   reason << matched << " of " << current.prior.size() << " features matched, "
          << options_.minimum_matches << " are needed";
   reason_ = reason.str();
@@ -75,16 +79,91 @@ void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedF
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
   // Lost soon after the start: nothing is known but directions.
   if (!relocaliser_.canFind(filter_, map_)) {
-    reset("lost with a map that has too few features of known depth: started anew");
+    abandonMap("lost with a map that has too few features of known depth: started anew");
     return;
   }
   if (options_.reset_when_lost_after_s > 0.0 && lost_s >= options_.reset_when_lost_after_s) {
     std::ostringstream reason;
     reason << "lost for " << lost_s << " s: started anew";
-    reset(reason.str());
+    abandonMap(reason.str());
     return;
   }
-  if (frame->index % kRelocalisationPeriodFrames == 0) relocalise(image, frame);
+  if (frame->index % kRelocalisationPeriodFrames == 0 && relocalise(image, frame)) return;
+  if (options_.new_map_when_lost_after_s > 0.0 && lost_s >= options_.new_map_when_lost_after_s &&
+      !awaits_loaded_map_)
+    beginNewMap(image, frame);
+}
+
+Tracker::Implementation::LostMap Tracker::Implementation::storeMap() {
+  LostMap stored{map_number_, lost_stamp_s_, filter_, noise_, map_, map_monitor_, scale_source_};
+  return stored;
+}
+
+void Tracker::Implementation::takeMap(LostMap stored) {
+  map_number_ = stored.number;
+  filter_ = std::move(stored.filter);
+  filter_.setOptions(withTrustIn(camera_.calibration(), options_.filter));
+  noise_ = std::move(stored.noise);
+  noise_.setOptions(options_.filter);
+  map_ = std::move(stored.map);
+  map_monitor_ = stored.monitor;
+  scale_source_ = stored.scale_source;
+  motion_noise_.reset();
+  structure_.clear();
+  structure_snapshot_ = {};
+  initialiser_.end();
+}
+
+/// Keeps the map that was lost, and begins another one where the image has enough to begin from.
+bool Tracker::Implementation::beginNewMap(const cv::Mat& image, TrackedFrame* frame) {
+  LostMap stored = storeMap();
+  const std::string reason = reason_;
+  clearMap();
+  start(image, frame);
+  if (state_ != TrackingState::kTracking) {
+    takeMap(std::move(stored));
+    state_ = TrackingState::kLost;
+    reason_ = reason;
+    frame->features_started = 0;
+    return false;
+  }
+  std::ostringstream begun;
+  begun << "lost for " << last_stamp_s_ - lost_stamp_s_ << " s: map " << maps_begun_
+        << " begun, the camera is looked for in the one before on the side";
+  frame->reason = begun.str();
+  map_number_ = maps_begun_++;
+  ++jumps_;
+  lost_maps_.push_back(std::move(stored));
+  if (lost_maps_.size() > kMostLostMaps) lost_maps_.erase(lost_maps_.begin());
+  last_look_stamp_s_ = last_stamp_s_;
+  return true;
+}
+
+/// While the camera is tracked in one map, looks for it in those in which it was lost. Found, it
+/// goes on in that one; the other is kept in its place. Whether it is.
+bool Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame) {
+  if (options_.reset_when_lost_after_s > 0.0) {
+    lost_maps_.erase(std::remove_if(lost_maps_.begin(), lost_maps_.end(),
+                                    [this](const LostMap& lost) {
+                                      return last_stamp_s_ - lost.lost_stamp_s >=
+                                             options_.reset_when_lost_after_s;
+                                    }),
+                     lost_maps_.end());
+  }
+  if (lost_maps_.empty() || last_stamp_s_ - last_look_stamp_s_ < kLookPeriodS) return false;
+  last_look_stamp_s_ = last_stamp_s_;
+  const std::size_t k = next_lost_map_++ % lost_maps_.size();
+  const auto found = relocaliser_.find(camera_, image, lost_maps_[k].filter, lost_maps_[k].map);
+  if (!found) return false;
+  LostMap left = storeMap();
+  left.lost_stamp_s = last_stamp_s_;
+  std::swap(left, lost_maps_[k]);
+  takeMap(std::move(left));
+  placeCamera(*found, frame);
+  if (!relocaliser_.canFind(lost_maps_[k].filter, lost_maps_[k].map))
+    lost_maps_.erase(lost_maps_.begin() + static_cast<std::ptrdiff_t>(k));
+  frame->reason = "found again in map " + std::to_string(map_number_);
+  return true;
 }
 
 /// Searches the whole image for the whole map. False when the camera is not found; the state is
@@ -92,26 +171,34 @@ void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedF
 bool Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
   const auto found = relocaliser_.find(camera_, image, filter_, map_);
   if (!found) return false;
+  placeCamera(*found, frame);
+  return true;
+}
+
+/// Puts the camera where it was found in the map.
+void Tracker::Implementation::placeCamera(const Relocalisation& found, TrackedFrame* frame) {
   CameraState camera;
-  camera.setPoseWorldCamera(found->T_world_camera);
+  camera.setPoseWorldCamera(found.T_world_camera);
   double depth = 0.0;
-  for (const FeatureMeasurement& inlier : found->inliers)
+  for (const FeatureMeasurement& inlier : found.inliers)
     depth += (filter_.find(inlier.id)->position() - camera.position_world).norm();
-  depth /= static_cast<double>(found->inliers.size());
+  depth /= static_cast<double>(found.inliers.size());
   Eigen::Matrix<double, 12, 1> sigma;
   sigma << Eigen::Vector3d::Constant(kRelocalisedSigmaPosition * depth),
       Eigen::Vector3d::Constant(kRelocalisedSigmaRotation),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
   filter_.relocateCamera(camera, sigma.array().square().matrix().asDiagonal());
-  const UpdateReport report = filter_.update(camera_, found->inliers);
+  const UpdateReport report = filter_.update(camera_, found.inliers);
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
   state_ = TrackingState::kTracking;
   reason_.clear();
   poor_frames_ = 0;
+  awaits_loaded_map_ = false;
+  motion_noise_.reset();
   initialiser_.end();
-  return true;
+  ++jumps_;
 }
 
 void Tracker::Implementation::saveMap(const std::string& path) const {
@@ -148,6 +235,9 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   initialiser_.end();
   structure_.clear();
   structure_snapshot_ = {};
+  lost_maps_.clear();
+  awaits_loaded_map_ = true;
+  map_number_ = maps_begun_++;
   state_ = TrackingState::kLost;
   reason_ = "map loaded: looking for the camera in it";
   lost_stamp_s_ = last_stamp_s_;

@@ -34,6 +34,7 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   frame->features_converted = static_cast<int>(filter_.convertToPoints().size());
   retire(map_.failing(options_.map), frame);
   retire(map_.drifting(), frame);
+  frame->features_failed = frame->features_retired;
   // The maximum may have been lowered.
   retire(map_.leastUseful(filter_, map_.size() - options_.map.maximum_features), frame);
   if (poor_frames_ > 0) return;  // where the camera is unsure, nothing new is put on the map

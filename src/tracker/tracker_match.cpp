@@ -20,9 +20,10 @@ void Tracker::Implementation::predict(double interval_s) {
     T_world_reference_ = filter_.camera().poseWorldCamera();
   } else {
     filter_.decayVelocity(kVelocityDecay);
+    motion_noise_.reset();
   }
   interval_s = std::min(interval_s, options_.max_frame_interval_s);
-  filter_.predict(interval_s);
+  filter_.predict(interval_s, motion_noise_.expected());
   noise_.predict(camera_, interval_s, &filter_);
 }
 
@@ -55,6 +56,11 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   prior.z = std::move(predicted.z);
   prior.S = std::move(predicted.S);
   prior.noise_variance_px2 = sigma_px * sigma_px;
+  const Eigen::Matrix<double, 6, 1> jerk =
+      impulseVariance(motion_noise_.widest(), current->predicted_interval_s) -
+      impulseVariance(motion_noise_.expected(), current->predicted_interval_s);
+  current->jerk_px = predicted.impulse_px * jerk.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  current->jerk_probability = motion_noise_.jerkProbability();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {
     if (ids[i] != prior.ids[kept]) continue;
@@ -99,6 +105,11 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
                &current->measurements);
   frame->match_sigma_px = noise_.typicalSigma_px();
 
+  Accelerations allowed = motion_noise_.expected();
+  if (current->is_jerk) {
+    allowed = motion_noise_.widest();
+    filter_.replaceAccelerations(allowed);
+  }
   // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
   const bool are_depths_guessed = initialiser_.areDepthsGuessed();
   const NoisePrior prior = are_depths_guessed ? NoisePrior() : noise_.prior();
@@ -106,9 +117,12 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 
+  motion_noise_.countImage(current->is_jerk);
+  if (!are_depths_guessed) motion_noise_.learn(report, allowed, current->predicted_interval_s);
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
   learnSlopes(*current);
   recordSearches(*current, frame->index);
+  if (!are_depths_guessed && !frame->repeated_image) judgeQuality(*current);
 }
 
 /// The accepted matches that pass the innovation gate, with the noise of their templates' fit.
@@ -130,6 +144,20 @@ void Tracker::Implementation::learnSlopes(const FrameState& current) {
     map_.learnSlope(current.candidates[i], current.templates[i], current.image,
                     current.measurements[k].pixel);
   }
+}
+
+/// Whether what was found fits the model.
+void Tracker::Implementation::judgeQuality(const FrameState& current) {
+  QualitySigns signs;
+  signs.variance_factor = noise_.varianceFactor();
+  signs.matched = static_cast<int>(current.inliers.size());
+  for (int i = 0; i < current.prior.size(); ++i) {
+    if (current.search.searchedPixels(i).size() == 0) continue;
+    ++signs.predicted;
+    if (!current.search.matches(i).empty()) ++signs.rejected;
+  }
+  signs.rejected -= signs.matched;
+  quality_.add(current.interval_s, signs, filter_.camera(), filter_.options());
 }
 
 /// The record of each feature that was searched.

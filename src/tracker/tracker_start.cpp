@@ -81,9 +81,11 @@ bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame
   if (initialiser_.isFirstUnrelated()) {
     start(current.image, frame);
     ++resets_;
+    ++jumps_;
     frame->reason = "the first image has nothing to do with the second: started anew from it";
     return true;
   }
+  initialiser_.expect(motion_noise_.expected());
   const auto initial = initialiser_.step(calibrated, filter_);
   if (!initial) return false;
   std::vector<FeatureId> dropped;  // too few measurements to take part

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct RecordedRunOptions {
   int maximum_frames = 0;  ///< so many images are tracked at most; 0: all
   bool known_target = false;
   double speed = 1.0;  ///< played at so many times the speed
+  std::function<void(CameraCalibration*)> change_calibration;
 };
 
 struct RecordedRun {
@@ -36,7 +38,9 @@ inline RecordedRun trackRecording(const std::string& name, RecordedRunOptions op
   if (options.known_target)
     options.tracker.known_points = readKnownPointsYaml(folder + "/known_target.yaml");
   RecordedSequence sequence(folder, options.every);
-  Tracker tracker(sequence.camera(), options.tracker);
+  CameraCalibration calibration = sequence.camera().calibration();
+  if (options.change_calibration) options.change_calibration(&calibration);
+  Tracker tracker(CameraModel(calibration), options.tracker);
   RecordedRun run;
   run.name = name;
   sequence.forEachFrame([&](const cv::Mat& image, double stamp_s) {

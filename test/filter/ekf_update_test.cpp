@@ -262,6 +262,12 @@ TEST_F(EkfUpdate, CovarianceForOtherAccelerationsIsWhatTheyWouldHavePredicted) {
       relativeDifference(calm.predictMeasurements(model_, predicted.ids, 0.0, jerks).S, expected),
       1e-3);
 
+  Ekf replaced = calm;
+  replaced.replaceAccelerations(jerks);
+  EXPECT_LT(relativeDifference(Eigen::MatrixXd(replaced.covariance()),
+                               Eigen::MatrixXd(jerky.covariance())),
+            1e-12);
+
   Random random(6);
   calm.update(model_, noisyMeasurements(calm, model_, 1.0, random));
   EXPECT_EQ(calm.predictMeasurements(model_, predicted.ids, 0.0, jerks).S,

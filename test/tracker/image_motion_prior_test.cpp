@@ -175,5 +175,42 @@ TEST(ImageMotionPrior, OfTooFewFeaturesSaysNothing) {
   EXPECT_EQ(after.S, c.prior.S);
 }
 
+/// A draw from the prior is tracked, to a pixel: gates shrink to about that, and lie where it is.
+TEST(ImageMotionPrior, FlowNarrowsGatesAndAWrongOneIsLeftOut) {
+  const int n = 30;
+  const Case c = makeCase(n, 4);
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd draw(2 * n);
+  for (int i = 0; i < 2 * n; ++i) draw[i] = normal(generator);
+  Eigen::MatrixXd P = c.prior.S;
+  P.diagonal().array() -= kNoisePx2;
+  const Eigen::VectorXd truth = c.prior.z + Eigen::MatrixXd(P.llt().matrixL()) * draw;
+  std::vector<std::optional<Eigen::Vector2d>> flow;
+  for (int i = 0; i < n; ++i)
+    flow.emplace_back(truth.segment<2>(2 * i) +
+                      Eigen::Vector2d(normal(generator), normal(generator)));
+  *flow[7] += Eigen::Vector2d(40.0, 15.0);
+  flow[9].reset();
+  const auto after = conditionOnFlow(c.prior, flow, 1.0);
+  ASSERT_TRUE(after);
+  for (int i = 0; i < n; ++i) {
+    EXPECT_LT(after->covariance(i).trace(), 0.05 * c.prior.covariance(i).trace()) << i;
+    EXPECT_GE(after->covariance(i).trace(), 2.0 * kNoisePx2) << i << ": the noise of a match stays";
+    const Eigen::Vector2d off = after->mean(i) - truth.segment<2>(2 * i);
+    EXPECT_LT(off.dot(after->covariance(i).inverse() * off), 20.0) << i;
+  }
+}
+
+TEST(ImageMotionPrior, FlowOfAMinorityIsNoGuide) {
+  const int n = 20;
+  const Case c = makeCase(n, 6);
+  std::vector<std::optional<Eigen::Vector2d>> flow(n);
+  for (int i = 0; i < n / 2; ++i) flow[i] = c.prior.mean(i);
+  EXPECT_FALSE(conditionOnFlow(c.prior, flow, 1.0));
+  flow[n / 2] = c.prior.mean(n / 2);
+  EXPECT_TRUE(conditionOnFlow(c.prior, flow, 1.0));
+}
+
 }  // namespace
 }  // namespace active_matching_slam

@@ -98,6 +98,85 @@ TEST(Kidnapping, TheCameraIsLostElsewhereAndFoundAtHomeInTheSameMap) {
   expectOnePath(film, before, Frames(after.begin() + found, after.end()), kCarriedOff + found);
 }
 
+/// Frames [0, count) of another place, from `first_stamp_s` on.
+Film farAway(int count, double first_stamp_s) {
+  SimulatorOptions options = filmOptions(count / 30.0 + 0.1);
+  options.scene = "office";
+  options.seed = 5;
+  Film other = makeFilm(options);
+  for (std::size_t i = 0; i < other.frames.size(); ++i)
+    other.frames[i].stamp_s = first_stamp_s + double(i) / 30.0;
+  return other;
+}
+
+TEST(Kidnapping, ANewMapIsBegunElsewhereWithinASecondAndTheOldOneFoundOnTheSide) {
+  constexpr int kAway = 110;
+  const Film film = putOff(slowFilm(), kAway / 30.0);
+  Tracker tracker(film.camera, {});
+  const Frames before = trackFrames(film, &tracker, 0, kCarriedOff);
+  EXPECT_EQ(before.back()->map, 0);
+  EXPECT_EQ(before.back()->jumps, 0);
+
+  const Film other = farAway(kAway, film.frames[kCarriedOff - 1].stamp_s + 1.0 / 30.0);
+  const Frames away = trackFrames(other, &tracker, 0, kAway);
+  const int lost = tracker.options().lost_after_frames;
+  const int begun = firstTracked(Frames(away.begin() + lost, away.end())) + lost;
+  EXPECT_LE(begun, lost + static_cast<int>(1.1 * 30.0)) << "within a second after the loss";
+  for (int i = lost; i < begun; ++i) EXPECT_EQ(away[i]->state, TrackingState::kLost) << i;
+  for (int i = begun; i < kAway; ++i) {
+    EXPECT_EQ(away[i]->state, TrackingState::kTracking) << i;
+    EXPECT_EQ(away[i]->map, 1) << i;
+    EXPECT_TRUE(isFinite(*away[i]));
+  }
+  EXPECT_NE(away[begun]->reason.find("map 1 begun"), std::string::npos) << away[begun]->reason;
+  EXPECT_EQ(away[begun]->jumps, 1);
+
+  const Frames after = trackFrames(film, &tracker, kCarriedOff, 180);
+  const auto home =
+      std::find_if(after.begin(), after.end(), [](const auto& frame) { return frame->map == 0; });
+  const auto found = static_cast<int>(home - after.begin());
+  ASSERT_LT(found, 30) << "within a second after it came back";
+  EXPECT_EQ(after[found]->jumps, 2);
+  for (std::size_t i = found; i < after.size(); ++i) {
+    EXPECT_EQ(after[i]->state, TrackingState::kTracking) << i;
+    EXPECT_EQ(after[i]->map, 0) << i;
+  }
+  EXPECT_EQ(after.back()->resets, 0);
+  expectOnePath(film, before, Frames(after.begin() + found, after.end()), kCarriedOff + found);
+}
+
+TEST(Kidnapping, WithoutNewMapsTheCameraStaysLost) {
+  TrackerOptions options;
+  options.new_map_when_lost_after_s = 0.0;
+  constexpr int kAway = 80;
+  const Film film = putOff(slowFilm(), kAway / 30.0);
+  Tracker tracker(film.camera, options);
+  trackFrames(film, &tracker, 0, kCarriedOff);
+  const Film other = farAway(kAway, film.frames[kCarriedOff - 1].stamp_s + 1.0 / 30.0);
+  const Frames away = trackFrames(other, &tracker, 0, kAway);
+  for (int i = options.lost_after_frames; i < kAway; ++i)
+    EXPECT_EQ(away[i]->state, TrackingState::kLost) << i;
+  EXPECT_EQ(away.back()->map, 0);
+}
+
+TEST(Kidnapping, NoNewMapIsBegunInTheDark) {
+  constexpr int kDark = 80;
+  Film film = putOff(slowFilm(), kDark / 30.0);
+  Tracker tracker(film.camera, {});
+  trackFrames(film, &tracker, 0, kCarriedOff);
+  const double begin_s = film.frames[kCarriedOff - 1].stamp_s;
+  for (int i = 1; i <= kDark; ++i) {
+    cv::Mat dark(240, 320, CV_8UC1, cv::Scalar(0));
+    dark.at<std::uint8_t>(100, 100 + i) = 10;
+    const auto frame = tracker.track(dark, begin_s + i / 30.0);
+    EXPECT_EQ(frame->map, 0);
+    if (i > tracker.options().lost_after_frames) EXPECT_EQ(frame->state, TrackingState::kLost) << i;
+  }
+  const Frames after = trackFrames(film, &tracker, kCarriedOff, 180);
+  EXPECT_LT(firstTracked(after), 15);
+  EXPECT_EQ(after.back()->map, 0);
+}
+
 TEST(Kidnapping, ACutToAnotherPartOfTheFilmIsFollowed) {
   // From the end of the film back to its beginning, and the stamps go on.
   Film film = slowFilm();

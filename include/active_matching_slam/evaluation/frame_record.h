@@ -26,8 +26,12 @@ struct FrameRecord {
   int nis_degrees = 0;
   int map_features = 0, map_points = 0;  ///< all, and those converted from inverse depth
   int missed = 0, rejected = 0;
-  int features_started = 0, features_retired = 0, features_converted = 0;
+  int features_started = 0, features_retired = 0, features_converted = 0, features_failed = 0;
   int resets = 0, times_lost = 0;
+  int map = 0, jumps = 0;
+  double quality = 1.0;
+  std::string quality_reason;
+  Accelerations accelerations;
   MatchStatistics matching;
   FrameTimings timings_ms;
 

@@ -30,6 +30,8 @@ class RunReport {
   /// One row a frame, comma separated; names and units in the header. Cells without a value are
   /// empty.
   std::string statisticsCsv() const;
+  /// TUM text of the tracked poses, with a comment line where another map or a jump begins.
+  std::string trajectoryText() const;
 
   /// Writes statistics.csv, trajectory.txt (TUM, one line for each frame tracked), summary.json and
   /// trajectory.png into an existing directory, and what writeStructureReport() writes when the

@@ -42,6 +42,11 @@ struct RunSummary {
   ScaleSource scale_source = ScaleSource::kFree;  ///< at the end
   double duration_s = 0.0;                        ///< from first to last stamp
 
+  int maps = 0;              ///< in which the camera was tracked
+  int main_map = 0;          ///< that of most tracked frames: errors are of the poses in it
+  int frames_in_main_map = 0;
+  double quality = 1.0;         ///< median over the tracked frames
+  std::string quality_reason;   ///< the most frequent cause of a low one
   int truth_pairs = 0;  ///< tracked frames with a true pose
   std::optional<double> ate_sim3_m, ate_se3_m, sim3_scale;
   std::optional<RelativePoseError> rpe;  ///< over 1 s; scaled as Sim(3) where the scale is free

@@ -20,6 +20,10 @@ struct PredictedMeasurements {
   std::vector<FeatureId> ids;  ///< those of the request that project (in front of the camera)
   Eigen::VectorXd z;           ///< 2F [px]
   Eigen::MatrixXd S;           ///< 2F x 2F, R included [px^2]
+  /// 2F x 6, how the impulse of the last predict() moves them [px per m/s and rad/s]; without
+  /// columns when the state has changed otherwise since. Allowing for more of it adds A dQ A^T to
+  /// S.
+  Eigen::MatrixXd impulse_px;
 };
 
 /// An image point assigned to a feature.
@@ -42,6 +46,13 @@ struct NoisePrior {
   double minimum_px2 = 0.0;  ///< bound of a typical measurement's variance per axis
 };
 
+/// What an update tells of three impulses' variance: the squares of their posterior means, in units
+/// of the variance allowed for, and what these sum up to when that is right: the fraction of each
+/// impulse's variance that the images resolve, 0 to 3. (Variance component estimation.)
+struct ImpulseEstimate {
+  double squares = 0.0, degrees = 0.0;
+};
+
 struct UpdateReport {
   int used = 0;
   int skipped = 0;      ///< unknown id, not finite, or behind the camera
@@ -56,7 +67,11 @@ struct UpdateReport {
   /// Estimate of the variance factor common to the measurements, 1 where R is right (see
   /// NoisePrior), and its degrees of freedom.
   double noise_scale = 1.0, noise_degrees = 0.0;
+  ImpulseEstimate linear, angular;  ///< of the last predict()
 };
+
+/// Variance per axis [(m/s)^2, (rad/s)^2] of the impulses of accelerations over an interval.
+Eigen::Matrix<double, 6, 1> impulseVariance(const Accelerations& sigmas, double interval_s);
 
 /// Extended Kalman filter over camera and map with full covariance in error-state form. The map's
 /// gauge - rotation of the world and scale - is transported with each correction (as by the
@@ -83,8 +98,16 @@ class Ekf {
   /// `covariance` as for reset().
   void relocateCamera(const CameraState& camera, const MotionCovariance& covariance);
 
-  /// Moves on by `interval_s` >= 0 with constant velocity (eq. 3.6-3.8).
-  void predict(double interval_s);
+  /// Moves on by `interval_s` >= 0 with constant velocity (eq. 3.6-3.8), with unknown accelerations
+  /// of the options' or the given standard deviations.
+  void predict(double interval_s) {
+    predict(interval_s,
+            {options_.sigma_acceleration_mps2, options_.sigma_angular_acceleration_rps2});
+  }
+  void predict(double interval_s, const Accelerations& sigmas);
+  /// The state as if the last predict() had been given these accelerations; nothing when the state
+  /// has changed otherwise since.
+  void replaceAccelerations(const Accelerations& sigmas);
 
   /// Landmark process noise: where a corner lies in its patch depends on the view of it. As that
   /// turned in the last `interval_s`, each landmark moved across its ray from the camera by a
@@ -113,8 +136,7 @@ class Ekf {
   std::vector<FeatureId> convertToPoints();
 
   /// `sigma_px`: of the measurements, per axis; 0: FilterOptions::sigma_px. `instead`: S as if the
-  /// last predict() had allowed for these accelerations in place of the options' (until the state
-  /// changes otherwise).
+  /// last predict() had been given these accelerations (until the state changes otherwise).
   PredictedMeasurements predictMeasurements(
       const CameraModel& camera, const std::vector<FeatureId>& ids, double sigma_px = 0.0,
       const std::optional<Accelerations>& instead = std::nullopt) const;
@@ -175,8 +197,6 @@ class Ekf {
     Eigen::Matrix<double, CameraError::kMotionSize, 6> G;
     Eigen::Matrix<double, 6, 1> variance;
   };
-  static Eigen::Matrix<double, 6, 1> impulseVariance(const Accelerations& sigmas,
-                                                     double interval_s);
 
   FilterOptions options_;
   CameraState camera_;

@@ -14,12 +14,13 @@ struct Accelerations {
 
 /// Settings of the EKF. Units: m stands for the map unit when scale is free.
 struct FilterOptions {
-  double sigma_acceleration_mps2 = 7.0;           ///< linear, per axis (eq. 3.6)
-  double sigma_angular_acceleration_rps2 = 12.0;  ///< angular, per axis
+  double sigma_acceleration_mps2 = 7.0;           ///< widest expected, linear, per axis (eq. 3.6)
+  double sigma_angular_acceleration_rps2 = 12.0;  ///< widest expected, angular, per axis
   double sigma_px = 0.45;                         ///< measurement noise, per axis
   /// Least noise of a match: what template matching reaches on natural images (Ackermann 1984).
   double minimum_sigma_px = 0.1;
   double noise_memory_s = 0.1;     ///< within which the noise of matches may change
+  double motion_memory_s = 0.4;    ///< within which the camera's accelerations may change
   double landmark_noise_px = 0.2;  ///< process noise per axis and root of a radian; see Ekf
   double initial_sigma_velocity_mps = 0.5;
   double initial_sigma_angular_velocity_rps = 0.5;
@@ -47,7 +48,7 @@ struct FilterOptions {
 template <class Self, class Visitor>
 void FilterOptions::visitFields(Self& o, Visitor&& visit) {
   visit(basicOption("filter/sigma_acceleration_mps2", "m/s^2",
-                    "jerks that are allowed for: linear acceleration, standard deviation per axis"),
+                    "widest linear acceleration that is expected, standard deviation per axis"),
         o.sigma_acceleration_mps2, 1e-3, 1e3);
   visit(basicOption("filter/sigma_angular_acceleration_rps2", "rad/s^2",
                     "the same, angular acceleration"),
@@ -91,6 +92,9 @@ void FilterOptions::visitFields(Self& o, Visitor&& visit) {
   visit(advancedOption("filter/noise_memory_s", "s",
                        "time within which the noise of matches may change"),
         o.noise_memory_s, 1e-3, 1e3);
+  visit(advancedOption("filter/motion_memory_s", "s",
+                       "time within which the camera's accelerations may change"),
+        o.motion_memory_s, 1e-3, 1e3);
   visit(advancedOption("filter/initial_sigma_velocity_mps", "m/s",
                        "how fast the camera may go at the start, standard deviation per axis"),
         o.initial_sigma_velocity_mps, 1e-3, 100.0);

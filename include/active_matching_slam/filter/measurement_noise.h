@@ -5,29 +5,9 @@
 #include <vector>
 
 #include "active_matching_slam/filter/filter_options.h"
+#include "active_matching_slam/filter/variance_scale.h"
 
 namespace active_matching_slam {
-
-/// Scale of a variance by its conjugate prior, the inverse gamma distribution: as sure as `degrees`
-/// observed degrees of freedom. Forgetting makes it follow a scale that drifts (Särkkä & Nummenmaa,
-/// Recursive noise adaptive Kalman filtering, IEEE TAC 2009).
-class VarianceScale {
- public:
-  VarianceScale(double scale, double degrees) : scale_(scale), degrees_(degrees) {}
-  double scale() const { return scale_; }
-  double degrees() const { return degrees_; }
-  /// Posterior after residuals whose squares, over their variances for a scale of 1, add up to
-  /// `squares` where `degrees` are expected.
-  void learn(double squares, double degrees) {
-    scale_ = (degrees_ * scale_ + squares) / (degrees_ + degrees);
-    degrees_ += degrees;
-  }
-  /// `factor` in (0, 1] of the degrees are kept.
-  void forget(double factor) { degrees_ *= factor; }
-
- private:
-  double scale_, degrees_;
-};
 
 /// Noise of a landmark's matches by their residuals: its variance relative to other landmarks', and
 /// its correlation over time.
@@ -88,6 +68,8 @@ class MeasurementNoise {
   double sigma_px(const FitPrecision& fit, const LandmarkNoise& landmark) const;
   /// The same of a typical match in the last image; before any, FilterOptions::sigma_px.
   double typicalSigma_px() const;
+  /// c_k, as learnt so far; 0: nothing is.
+  double varianceFactor() const { return has_learnt_ ? scale_.scale() : 0.0; }
   /// Degrees of freedom of the prior of c_k in the image in hand.
   double degrees() const;
   /// FeatureMeasurement::variance_inflation of such a match: its long-run variance over its

@@ -79,6 +79,8 @@ class Initialiser {
   /// Once after each add(): bounded work, and at times a state to restore. `model` as calibrated;
   /// the readout is estimated too.
   std::optional<InitialState> step(const CameraModel& model, const Ekf& filter);
+  /// How uncertain velocities are from one image to the next; by default, as FilterOptions say.
+  void expect(const Accelerations& accelerations) { expected_ = accelerations; }
 
  private:
   bool hasGrown(double parallax);
@@ -102,6 +104,7 @@ class Initialiser {
   int images_ = 0, last_images_ = 0;
   int adjusting_images_ = 0;  ///< that the adjustment in hand has taken; 0: none is
   bool is_last_added_ = false, is_first_unrelated_ = false;
+  std::optional<Accelerations> expected_;
 };
 
 }  // namespace active_matching_slam

@@ -78,6 +78,7 @@ struct MatchResult {
                                       ///< matches below merge_probability
   std::vector<MatchHypothesis> hypotheses;      ///< heaviest first; never empty when F > 0
   std::vector<std::pair<int, int>> tree_edges;  ///< chow_liu: (i, j), i < j; else empty
+  bool is_wide = false;  ///< accepted: a hypothesis of the prior's wide Gaussian
   MatchStatistics statistics;
   std::vector<MatchStep> trace;  ///< empty unless options.keep_trace
 };

@@ -22,6 +22,10 @@ struct MeasurementPrior {
   Eigen::MatrixXd S;                ///< 2F x 2F, measurement noise included [px^2]
   double noise_variance_px2 = 1.0;  ///< R = noise_variance_px2 * I, already inside S
   std::vector<FeatureRates> rates;  ///< F, or empty for the defaults of the options
+  /// The prior may be a mixture: with this probability the covariance is `wide_S` (2F x 2F, of the
+  /// same mean, at least S), as when the camera jerks. Matchers of one Gaussian take S.
+  double wide_probability = 0.0;
+  Eigen::MatrixXd wide_S;
 
   int size() const { return static_cast<int>(ids.size()); }
   auto mean(int feature) const { return z.segment<2>(2 * feature); }

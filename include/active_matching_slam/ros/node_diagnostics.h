@@ -60,6 +60,9 @@ class NodeDiagnostics {
   ScaleSource scale_source_ = ScaleSource::kFree;
   std::size_t features_ = 0;
   int candidates_ = 0, matched_ = 0, resets_ = 0, times_lost_ = 0;
+  int map_ = 0;
+  double quality_ = 1.0;
+  std::string quality_reason_;
   std::string matcher_;
 };
 

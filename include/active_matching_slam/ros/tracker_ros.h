@@ -79,6 +79,7 @@ class TrackerRos {
   TrajectoryLog trajectory_;
   TrackingState state_ = TrackingState::kWaiting;
   int generation_ = 0, resets_ = 0;
+  int map_ = 0;
   double last_stamp_s_ = 0.0;
   RepeatedWarning warning_, restart_warning_;
   std::string reset_cause_;  ///< asked for by a service: not worth a warning

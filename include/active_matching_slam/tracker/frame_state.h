@@ -35,12 +35,17 @@ struct FrameState {
   /// Where it was in `reference_image`; empty where it was not in view.
   std::vector<std::optional<Eigen::Vector2d>> reference_px;
   MeasurementPrior prior;
+  /// 2F x any: what a jerk, an acceleration as wide as the options expect, adds to the prior's S is
+  /// this times its transpose.
+  Eigen::MatrixXd jerk_px;
+  double jerk_probability = 0.0;
   /// The last image with enough matches, whose camera is known. Empty when there is none.
   cv::Mat reference_image;
 
   // From the matching.
   ImageFeatureSearch search;  ///< the match indices of `matching` point into it
   MatchResult matching;
+  bool is_jerk = false;  ///< matched only when a jerk was allowed for: `prior` does
   /// Entries of `prior` whose accepted match passes the innovation gate, ascending.
   std::vector<int> inliers;
 

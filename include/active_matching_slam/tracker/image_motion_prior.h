@@ -25,4 +25,12 @@ MeasurementPrior conditionOnImageMotion(
     const MeasurementPrior& prior, const std::vector<std::optional<Eigen::Vector2d>>& before_px,
     const ImageMotion& motion);
 
+/// The prior given where its features were tracked to from one image to the next (`flow_px`, empty
+/// where they were not), each to `sigma_px` per axis. Flows that the others contradict are left out
+/// (data snooping, leaveOneOutInliers()). Empty when these are half of the prior's features or more.
+/// The noise that is inside S stays what it is.
+std::optional<MeasurementPrior> conditionOnFlow(
+    const MeasurementPrior& prior, const std::vector<std::optional<Eigen::Vector2d>>& flow_px,
+    double sigma_px);
+
 }  // namespace active_matching_slam

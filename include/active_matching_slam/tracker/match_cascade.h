@@ -48,9 +48,9 @@ class MatchCascade {
   struct Fallback;
 
   void matchWithFallbacks(const MatchOptions& matching, FrameState* frame);
-  void retryGuided(const MatchOptions& matching, FrameState* frame);
-  void tryConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
-                            FrameState* frame);
+  bool retry(const MatchOptions& matching, const MeasurementPrior& prior, FrameState* frame) const;
+  bool tryConsensusMatchers(const MatchOptions& matching, const MeasurementPrior& prior,
+                            FrameState* frame) const;
   bool tryFallback(const Fallback& fallback, const MatchOptions& matching, FrameState* frame) const;
   MatchOptions withBudget(const MatchOptions& matching, double fraction,
                           const FrameState& frame) const;

@@ -76,6 +76,7 @@ struct TrackedFrame {
   /// 12 x 12, CameraError order (world-frame additive position, world-frame rotation vector, ...).
   MotionCovariance camera_covariance = MotionCovariance::Zero();
   double match_sigma_px = 0.0;  ///< noise per axis of most matches; 0: none were searched
+  Accelerations accelerations;  ///< expected of the camera, as learnt so far
   double nis = 0.0;
   int nis_degrees = 0;
 
@@ -87,9 +88,17 @@ struct TrackedFrame {
   MeasurementPrior prior;
   std::vector<Template> templates;
   int features_started = 0, features_retired = 0, features_converted = 0;
+  int features_failed = 0;  ///< of those retired: their matches failed, or drifted off
   std::int64_t retired_total = 0;
   int resets = 0;  ///< resets since construction
   int times_lost = 0;
+  /// Which map the pose is in: each has a world, and a unit of length, of its own. Numbers of maps
+  /// that were begun, from 0 on.
+  int map = 0;
+  /// Whether the poses can be trusted, 0 to 1, and the likely cause where they can't.
+  double quality = 1.0;
+  std::string quality_reason;
+  int jumps = 0;  ///< so often since construction the pose did not go on from the one before
 
   std::shared_ptr<const MutualInformationGraph> graph;  ///< null unless asked for
   std::shared_ptr<const SubmapHierarchy> submaps;       ///< null unless asked for

@@ -53,7 +53,8 @@ struct TrackerOptions {
   double max_frame_interval_s = 0.5;     ///< after a longer gap the whole image is searched first
   int lost_after_frames = 15;            ///< consecutive frames with too few matches
   int minimum_matches = 4;               ///< fewer is 'too few'
-  double reset_when_lost_after_s = 0.0;  ///< 0: never reset, keep looking for the map
+  double new_map_when_lost_after_s = 1.0;  ///< the old one is kept and looked for; 0: never
+  double reset_when_lost_after_s = 0.0;  ///< give up the map that was lost; 0: never
   bool learn_rates = true;               ///< of each feature's true and false matches
   bool fallback_matchers = true;         ///< where few match, see MatchCascade
   bool structure = false;                ///< maintain the MI graph and the submaps
@@ -89,8 +90,12 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
   visit(basicOption("lost_after_frames", "",
                     "frames with too few matches in a row until the camera is lost"),
         o.lost_after_frames, 1, 10000);
+  visit(basicOption("new_map_when_lost_after_s", "s",
+                    "begin a new map when lost for so long, and look for the old one on the side; "
+                    "0: never"),
+        o.new_map_when_lost_after_s, 0.0, 1e6);
   visit(basicOption("reset_when_lost_after_s", "s",
-                    "start anew when lost for so long; 0: keep looking"),
+                    "give up a map that was lost so long ago; 0: keep looking for it"),
         o.reset_when_lost_after_s, 0.0, 1e6);
   visit(advancedOption("minimum_matches", "", "fewer matches in a frame are too few"),
         o.minimum_matches, 1, 1000);
