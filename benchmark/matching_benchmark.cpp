@@ -117,8 +117,9 @@ const std::vector<ImageProblem>& cachedProblems(int features, int width, int hei
   if (!problems.empty()) return problems;
   problems = imageProblems(options, 16);
   const FeatureRates rates = countedRates(problems);
-  std::printf("%d features, %dx%d, %g Hz: the images answer with Ptp %.3f, Pfp %.1e per pixel\n",
-              features, width, height, rate, rates.true_positive, rates.false_positive);
+  std::fprintf(stderr,
+               "%d features, %dx%d, %g Hz: the images answer with Ptp %.3f, Pfp %.1e per pixel\n",
+               features, width, height, rate, rates.true_positive, rates.false_positive);
   for (ImageProblem& problem : problems)
     problem.prior.rates.assign(static_cast<std::size_t>(problem.prior.size()), rates);
   return problems;
@@ -326,14 +327,15 @@ double exponentOf(const std::map<int, double>& cost) {
 void printSummary() {
   for (const auto& [label, cost] : medians())
     if (cost.size() > 2)
-      std::printf("%-20s grows with features ^ %.2f (%d to %d)\n", label.c_str(), exponentOf(cost),
-                  cost.begin()->first, cost.rbegin()->first);
+      std::fprintf(stderr, "%-20s grows with features ^ %.2f (%d to %d)\n", label.c_str(),
+                   exponentOf(cost), cost.begin()->first, cost.rbegin()->first);
   for (const auto& [name, seconds] : shortcutSeconds()) {
     if (name.rfind("plain/", 0) != 0) continue;
     const auto shortcut = shortcutSeconds().find("shortcut/" + name.substr(6));
     if (shortcut == shortcutSeconds().end()) continue;
-    std::printf("shortcut %-40s %10.2f us -> %8.2f us, %.1f times faster\n", name.substr(6).c_str(),
-                1e6 * seconds, 1e6 * shortcut->second, seconds / shortcut->second);
+    std::fprintf(stderr, "shortcut %-40s %10.2f us -> %8.2f us, %.1f times faster\n",
+                 name.substr(6).c_str(), 1e6 * seconds, 1e6 * shortcut->second,
+                 seconds / shortcut->second);
   }
 }
 

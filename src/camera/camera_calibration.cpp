@@ -5,9 +5,18 @@
 #include <initializer_list>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 
 namespace active_matching_slam {
 namespace {
+
+/// Focal lengths by the image's width. Derivation: a third is a view of 113 degrees without
+/// distortion, twenty one of 3 degrees; 1 / 2 pi one of 360 degrees by an equidistant lens.
+constexpr double kLeastFocal = 1.0 / 3.0, kMostFocal = 20.0, kLeastFocalOfFisheye = 0.159;
+/// The image's middle half begins there. Cost: of an image that was cropped more to one side the
+/// calibration is doubted.
+constexpr double kMiddle = 0.25;
 
 [[noreturn]] void refuse(const std::string& field, double value, const std::string& allowed) {
   std::ostringstream message;
@@ -79,7 +88,7 @@ DistortionModel distortionModelFromName(const std::string& name) {
   if (name.empty() || name == "none") return DistortionModel::kNone;
   if (name == "plumb_bob") return DistortionModel::kPlumbBob;
   if (name == "rational_polynomial") return DistortionModel::kRationalPolynomial;
-  if (name == "equidistant") return DistortionModel::kEquidistant;
+  if (name == "equidistant" || name == "fisheye") return DistortionModel::kEquidistant;
   throw std::invalid_argument(
       "distortion_model is '" + name +
       "', must be one of plumb_bob, rational_polynomial, equidistant, none");
@@ -124,6 +133,41 @@ CameraCalibration cropAndBin(const CameraCalibration& full, int roi_x, int roi_y
   delivered.cx = (full.cx - roi_x) / binning_x;
   delivered.cy = (full.cy - roi_y) / binning_y;
   return delivered;
+}
+
+std::vector<double> completeCoefficients(DistortionModel model, std::vector<double> coefficients) {
+  std::size_t least = 0;
+  if (model == DistortionModel::kPlumbBob) least = coefficients.empty() ? 0 : 4;
+  if (model == DistortionModel::kEquidistant) least = 4;
+  if (model == DistortionModel::kRationalPolynomial) least = 8;
+  if (coefficients.size() < least) coefficients.resize(least, 0.0);
+  return coefficients;
+}
+
+std::vector<std::string> calibrationDoubts(const CameraCalibration& calibration) {
+  std::vector<std::string> doubts;
+  std::ostringstream text;
+  const auto say = [&] {
+    doubts.push_back(text.str());
+    text.str("");
+  };
+  const double width = calibration.width, height = calibration.height;
+  const bool fisheye = calibration.distortion_model == DistortionModel::kEquidistant;
+  const double least = width * (fisheye ? kLeastFocalOfFisheye : kLeastFocal);
+  for (const auto& [name, focal] :
+       {std::make_pair("fx", calibration.fx), std::make_pair("fy", calibration.fy)}) {
+    if (focal >= least && focal <= kMostFocal * width) continue;
+    text << name << " = " << focal << " px is not from " << least << " to " << kMostFocal * width
+         << " px, as lenses for an image " << width << " px wide have";
+    say();
+  }
+  for (const auto& [name, centre, size] : {std::make_tuple("cx", calibration.cx, width),
+                                           std::make_tuple("cy", calibration.cy, height)}) {
+    if (centre > kMiddle * size && centre < (1.0 - kMiddle) * size) continue;
+    text << name << " = " << centre << " px is not in the middle half of " << size << " px";
+    say();
+  }
+  return doubts;
 }
 
 bool hasDistortion(const CameraCalibration& calibration) {

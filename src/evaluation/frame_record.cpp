@@ -8,6 +8,7 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.state = frame.state;
   record.reason = frame.reason;
   record.repeated_image = frame.repeated_image;
+  record.ignored_image = frame.image.empty();
   record.scale_source = frame.scale_source;
   record.pose = {frame.stamp_s, frame.camera.poseWorldCamera()};
   record.speed = frame.camera.velocity_world.norm();
@@ -34,6 +35,7 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.quality = frame.quality;
   record.quality_reason = frame.quality_reason;
   record.accelerations = frame.accelerations;
+  record.late_images = frame.late_images;
   record.matching = frame.matching.statistics;
   record.timings_ms = frame.timings_ms;
   return record;

@@ -18,7 +18,7 @@ int runSequence(ImageSource* source, Tracker* tracker, const RunOptions& options
   double stamp_s = 0.0;
   while ((options.maximum_frames == 0 || frames < options.maximum_frames) &&
          source->next(&image, &stamp_s)) {
-    observe(*tracker->track(image, stamp_s));
+    observe(*tracker->track(image, stamp_s, source->fault()));
     ++frames;
     for (int skipped = 1; skipped < options.every; ++skipped)
       if (!source->skip()) return frames;

@@ -121,6 +121,8 @@ void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summ
     summary->converted += record.features_converted;
     summary->times_lost = std::max(summary->times_lost, record.times_lost);
     summary->resets = std::max(summary->resets, record.resets);
+    summary->late_images = std::max(summary->late_images, record.late_images);
+    if (!record.reason.empty()) summary->last_reason = record.reason;
   }
   std::set<int> maps;
   std::vector<double> qualities;

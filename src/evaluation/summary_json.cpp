@@ -22,6 +22,7 @@ std::string summaryJson(const RunSummary& s) {
   json["frames_in_main_map"] = s.frames_in_main_map;
   json["quality"] = s.quality;
   json["quality_reason"] = s.quality_reason;
+  json["late_images"] = s.late_images;
   json["duration_s"] = s.duration_s;
   json["matcher"] = s.matcher.empty() ? Json(nullptr) : Json(s.matcher);
   json["scale_source"] = scaleSourceName(s.scale_source);

@@ -49,7 +49,7 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
 
 UpdateReport Ekf::update(const CameraModel& camera,
                          const std::vector<FeatureMeasurement>& measurements,
-                         const NoisePrior& noise) {
+                         const NoisePrior& noise, Corrected corrected) {
   UpdateReport report;
   const CameraModel lens = camera.corrected(camera_.lens);
   std::vector<UsableMeasurement> usable;
@@ -80,6 +80,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
   if (impulse_) impulse = impulse_->G * impulse_->variance.cwiseSqrt().asDiagonal();
   RobustUpdate correction(camera, camera_, features_, covariance_, usable, noise, impulse,
                           X.leftCols(rows));
+  if (corrected == Corrected::kCamera) correction.considerMap();
   if (!correction.solve(options_.update_iterations)) {
     report.healthy = false;
     return report;
@@ -98,8 +99,10 @@ UpdateReport Ekf::update(const CameraModel& camera,
   features_ = correction.features();
   report.nis = correction.nis();
   report.used = static_cast<int>(usable.size());
-  report.healthy = correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
-                                     correction.gaugeCovariance(), added, rows, X);
+  report.healthy = corrected == Corrected::kCamera
+                       ? correctCameraCovariance(added, X.leftCols(rows))
+                       : correctCovariance(correction.gaugeChange(), correction.gaugeFunctionals(),
+                                           correction.gaugeCovariance(), added, rows, X);
   limitInverseDepths();
   return report;
 }
@@ -131,6 +134,16 @@ bool Ekf::correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
   P.selfadjointView<Eigen::Lower>().rankUpdate(X, -1.0);
   P.selfadjointView<Eigen::Lower>().rankUpdate(A, 1.0);
   P.topLeftCorner<kMotion, kMotion>() += added;
+  const bool sound = repairVariances(variances_before);
+  covariance_.mirrorLower();
+  return sound;
+}
+
+bool Ekf::correctCameraCovariance(const MotionCovariance& added, const Eigen::MatrixXd& X) {
+  auto P = covariance_.view();
+  const Eigen::VectorXd variances_before = P.diagonal();
+  P.leftCols<CameraError::kSize>().noalias() -= X * X.topRows<CameraError::kSize>().transpose();
+  P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() += added;
   const bool sound = repairVariances(variances_before);
   covariance_.mirrorLower();
   return sound;

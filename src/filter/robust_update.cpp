@@ -220,11 +220,14 @@ bool RobustUpdate::step(bool first) {
   X_.topRows<kMotion>() += more;
   added_.noalias() = more * GK.transpose();
   delta_.noalias() = X_ * llt_.solve(innovation);
+  if (is_map_considered_) delta_.tail(delta_.size() - CameraError::kSize).setZero();
   if (!delta_.allFinite()) return false;
   camera_ = prior_camera_;
   features_ = prior_features_;
   applyError(delta_, camera_, features_);
-  C_ = gaugeGenerators(camera_, features_, covariance_.size()) - prior_gauge_;
+  // The gauge is the map's: where that stands still there is none to be transported.
+  if (!is_map_considered_)
+    C_ = gaugeGenerators(camera_, features_, covariance_.size()) - prior_gauge_;
   return true;
 }
 

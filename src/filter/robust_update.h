@@ -45,6 +45,9 @@ class RobustUpdate {
                std::vector<UsableMeasurement> measurements, const NoisePrior& noise,
                const ImpulseRoot& impulse, Eigen::Ref<Eigen::MatrixXd> X);
 
+  /// Corrected::kCamera. Before solve().
+  void considerMap() { is_map_considered_ = true; }
+
   /// False when S could not be factorised or the result is not finite: nothing is to be fused.
   bool solve(int iterations);
 
@@ -102,6 +105,7 @@ class RobustUpdate {
   std::vector<Eigen::Vector2d> residuals_px_;
   double noise_scale_ = 1.0, noise_degrees_ = 0.0;
   ImpulseEstimate linear_impulse_, angular_impulse_;
+  bool is_map_considered_ = false;
   std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points
   double nis_ = 0.0;
 };

@@ -85,8 +85,9 @@ void ImageFeatureSearch::searchCoarseToFine(Feature& feature, const SearchEllips
     feature.is_wide = true;
   }
   int covered = 0;
-  forEachEllipseRun(ellipse, valid,
-                    [&](const PixelRun& run) { covered += feature.covered.insert(run); });
+  forEachEllipseRun(ellipse, valid, [&](const PixelRun& run) {
+    forEachUnmasked(run, [&](const PixelRun& part) { covered += feature.covered.insert(part); });
+  });
   const double clutter = kClutter[level];
   feature.coarse_pixels += covered;
   feature.coarse_clutter_pixels += clutter * covered;
@@ -197,7 +198,9 @@ void ImageFeatureSearch::addPeakNear(Feature& feature, const Candidate& place,
     const Candidate best = bestAround(image, feature.patch, middle.u, middle.v, kFineReach);
     const bool is_inside = best.u >= valid.min_u && best.u <= valid.max_u &&
                            best.v >= valid.min_v && best.v <= valid.max_v;
-    if (best.score < static_cast<float>(options_.match_threshold) || !is_inside) return;
+    if (best.score < static_cast<float>(options_.match_threshold) || !is_inside ||
+        !isCentre(best.u, best.v))
+      return;
     constexpr int kSide = 2 * kFineReach + 1;
     const int column = best.u - middle.u + kFineReach, row = best.v - middle.v + kFineReach;
     if (column > 0 && row > 0 && column < kSide - 1 && row < kSide - 1) {

@@ -128,15 +128,17 @@ std::optional<Eigen::Vector2d> steadiestPoint(const cv::Mat& image, const Eigen:
 /// The corner moved to where template alignment is least sensitive to warps, or as it was where
 /// that is too far or not allowed.
 Corner refined(const Corner& corner, const cv::Mat& image, const cv::Rect& area,
-               const std::vector<Eigen::Vector2d>& occupied, double squared_distance, int size) {
+               const std::vector<Eigen::Vector2d>& occupied, double squared_distance, int size,
+               const cv::Mat& centres) {
   Corner moved = corner;
   for (int k = 0; k < kRefinements; ++k) {
     const auto point = steadiestPoint(image, moved.pixel, size);
     if (!point || !((*point - corner.pixel).norm() <= kFarthestPx)) return corner;
     moved.pixel = {std::round(point->x()), std::round(point->y())};
   }
+  const cv::Point place(static_cast<int>(moved.pixel.x()), static_cast<int>(moved.pixel.y()));
   const bool is_inside =
-      area.contains({static_cast<int>(moved.pixel.x()), static_cast<int>(moved.pixel.y())});
+      area.contains(place) && (centres.empty() || centres.at<std::uint8_t>(place) != 0);
   return is_inside && squaredDistanceToNearest(moved.pixel, occupied) >= squared_distance ? moved
                                                                                           : corner;
 }
@@ -145,7 +147,8 @@ Corner refined(const Corner& corner, const cv::Mat& image, const cv::Rect& area,
 
 std::vector<Corner> detectCorners(const cv::Mat& image,
                                   const std::vector<Eigen::Vector2d>& occupied, int wanted,
-                                  double minimum_distance_px, const ImageOptions& options) {
+                                  double minimum_distance_px, const ImageOptions& options,
+                                  const cv::Mat& centres) {
   std::vector<Corner> corners;
   const int border = std::max(options.border_px, options.source_patch_size_px / 2) + 1;
   const cv::Rect area(border, border, image.cols - 2 * border, image.rows - 2 * border);
@@ -169,6 +172,7 @@ std::vector<Corner> detectCorners(const cv::Mat& image,
       const cv::Rect& cell = cells[i].area;
       const cv::Rect rim(cell.x - 1, cell.y - 1, cell.width + 2, cell.height + 2);
       cv::cornerMinEigenVal(image(rim), cells[i].response, kTensorWindow);
+      if (!centres.empty()) cells[i].response.setTo(0.0, centres(rim) == 0);
       double most = 0.0;
       cv::minMaxLoc(cells[i].response, nullptr, &most);
       strongest = std::max(strongest, most);
@@ -181,7 +185,8 @@ std::vector<Corner> detectCorners(const cv::Mat& image,
                          static_cast<int>(corner.pixel.y()),
                          options.template_size_px) < options.minimum_contrast)
         continue;
-      corner = refined(corner, image, area, taken, squared_distance, options.template_size_px);
+      corner =
+          refined(corner, image, area, taken, squared_distance, options.template_size_px, centres);
       corners.push_back(corner);
       taken.push_back(corner.pixel);
       if (static_cast<int>(corners.size()) == wanted) return corners;

@@ -57,8 +57,10 @@ ImageFeatureSearch::ImageFeatureSearch(const ImageOptions& options)
       correlator_(std::max(1.0, kContrastLoss * options.minimum_contrast)) {}
 
 void ImageFeatureSearch::beginFrame(const cv::Mat& image, const std::vector<Template>& templates,
-                                    const std::vector<TemplateSource>& sources) {
+                                    const std::vector<TemplateSource>& sources,
+                                    const cv::Mat& centres) {
   image_ = image.type() == CV_8UC1 ? image : cv::Mat();
+  centres_ = centres;
   feature_count_ = static_cast<int>(templates.size());
   if (features_.size() < templates.size()) features_.resize(templates.size());
   for (int i = 0; i < feature_count_; ++i) {
@@ -75,6 +77,7 @@ void ImageFeatureSearch::beginFrame(const cv::Mat& image, const std::vector<Temp
       level.is_made = false;
       level.searched.clear();
     }
+    feature.partly_masked = false;
   }
   pyramid_.begin(image_);
   sources_ = sources;
@@ -92,8 +95,9 @@ PixelBox ImageFeatureSearch::validArea(int feature) const {
 int ImageFeatureSearch::countNewPixels(int feature, const SearchEllipse& ellipse) const {
   const PixelMask& searched = searchedPixels(feature);
   int count = 0;
-  forEachEllipseRun(ellipse, validArea(feature),
-                    [&](const PixelRun& run) { count += searched.countMissing(run); });
+  forEachEllipseRun(ellipse, validArea(feature), [&](const PixelRun& run) {
+    forEachUnmasked(run, [&](const PixelRun& part) { count += searched.countMissing(part); });
+  });
   return count;
 }
 
@@ -104,7 +108,10 @@ SearchOutcome ImageFeatureSearch::search(int feature_index, const SearchEllipse&
   if (!isProperEllipse(ellipse)) return outcome;
   const std::int64_t searched_before = searchedPixels(feature_index).size();
   const std::int64_t correlated_before = pixels_searched_;
-  outcome.pixels_in_ellipse = countEllipsePixels(ellipse, valid);
+  forEachEllipseRun(ellipse, valid, [&](const PixelRun& run) {
+    feature.partly_masked |= forEachUnmasked(
+        run, [&](const PixelRun& part) { outcome.pixels_in_ellipse += part.end_u - part.begin_u; });
+  });
   const int level = coarseLevel(feature_index, ellipse, outcome.pixels_in_ellipse);
   if (level > 0) {
     searchCoarseToFine(feature, ellipse, valid, level);
@@ -123,7 +130,9 @@ void ImageFeatureSearch::searchPixels(Feature& feature, const SearchEllipse& ell
                                       const PixelBox& valid) {
   added_.clear();
   candidates_.clear();
-  forEachEllipseRun(ellipse, valid, [&](const PixelRun& run) { addSearchedRun(feature, run); });
+  forEachEllipseRun(ellipse, valid, [&](const PixelRun& run) {
+    forEachUnmasked(run, [&](const PixelRun& part) { addSearchedRun(feature, part); });
+  });
   scoreAddedRuns(feature);
   // The list grows while it is worked off.
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
@@ -210,7 +219,7 @@ void ImageFeatureSearch::coverBox(Feature& feature, const PixelBox& box) {
 void ImageFeatureSearch::decideCandidate(Feature& feature, const Candidate& candidate,
                                          const PixelBox& valid) {
   // Neighbours just outside the valid area may be scored to decide, but are no matches.
-  if (!contains(valid, candidate.u, candidate.v)) return;
+  if (!contains(valid, candidate.u, candidate.v) || !isCentre(candidate.u, candidate.v)) return;
   const int u = candidate.u, v = candidate.v;
   for (int dv = -1; dv <= 1; ++dv)
     for (int du = -1; du <= 1; ++du)

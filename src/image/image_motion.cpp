@@ -37,7 +37,18 @@ cv::Mat smooth(const cv::Mat& image) {
 struct Copies {
   double scale;
   cv::Mat previous, now;
+  cv::Mat used;  ///< CV_8U; empty: all
 };
+
+/// `used` at the size of a copy, less what smoothing brought in from beside it.
+cv::Mat usedOfCopy(const cv::Mat& used, const cv::Size& size) {
+  if (used.empty()) return {};
+  constexpr int kReach = static_cast<int>(2.0 * kSmoothing);
+  cv::Mat small;
+  cv::resize(used, small, size, 0.0, 0.0, cv::INTER_AREA);
+  cv::erode(small == 255, small, cv::Mat::ones(2 * kReach + 1, 2 * kReach + 1, CV_8U));
+  return small;
+}
 
 /// Improves the motion on the copies. Returns the correlation reached, 0 for none.
 double align(const Copies& copies, ImageMotion* motion) {
@@ -52,7 +63,7 @@ double align(const Copies& copies, ImageMotion* motion) {
     correlation = cv::findTransformECC(
         copies.previous, copies.now, warp, cv::MOTION_EUCLIDEAN,
         cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kMostSteps, kSmallGain),
-        cv::noArray(), 1);
+        copies.used.empty() ? cv::InputArray(cv::noArray()) : cv::InputArray(copies.used), 1);
   } catch (const cv::Exception&) {  // OpenCV's way of saying that it did not converge
     return 0.0;
   }
@@ -76,15 +87,17 @@ double farthestApart(const ImageMotion& a, const ImageMotion& b, const cv::Size&
 }  // namespace
 
 std::optional<ImageMotion> estimateImageMotion(const cv::Mat& previous, const cv::Mat& image,
-                                               const ImageMotion& guess) {
+                                               const ImageMotion& guess, const cv::Mat& used) {
   if (image.empty() || image.size() != previous.size() || image.type() != CV_8UC1 ||
       previous.type() != CV_8UC1)
     return std::nullopt;
   const double scale = static_cast<double>(kFineWidth) / image.cols, sigma_px = kSigma / scale;
   const cv::Mat small_previous = smallCopy(previous, scale), small_now = smallCopy(image, scale);
-  const Copies fine = {scale, smooth(small_previous), smooth(small_now)};
+  const Copies fine = {scale, smooth(small_previous), smooth(small_now),
+                       usedOfCopy(used, small_now.size())};
+  const cv::Mat coarse_now = smooth(smallCopy(small_now, kCoarseOfFine));
   const Copies coarse = {kCoarseOfFine * scale, smooth(smallCopy(small_previous, kCoarseOfFine)),
-                         smooth(smallCopy(small_now, kCoarseOfFine))};
+                         coarse_now, usedOfCopy(used, coarse_now.size())};
   // Coarse to fine reaches far; from the guess the fine copies alone find what is near. Where the
   // scene repeats itself these are two places, and one is right only if it fits clearly better.
   ImageMotion far = guess, near = guess;

@@ -69,7 +69,7 @@ DescribedPoints describeCornersAtScale(const cv::Mat& image, double scale) {
 
 }  // namespace
 
-DescribedPoints describeCorners(const cv::Mat& image) {
+DescribedPoints describeCorners(const cv::Mat& image, const ImageMask& mask) {
   std::array<DescribedPoints, std::size(kScales)> of_scale;
   const auto describe = [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i)
@@ -79,8 +79,11 @@ DescribedPoints describeCorners(const cv::Mat& image) {
   cv::parallel_for_(cv::Range(0, count), describe, count);
   DescribedPoints result;
   for (const DescribedPoints& points : of_scale) {
-    result.pixels.insert(result.pixels.end(), points.pixels.begin(), points.pixels.end());
-    if (!points.pixels.empty()) result.descriptors.push_back(points.descriptors);
+    for (std::size_t i = 0; i < points.pixels.size(); ++i) {
+      if (!mask.isSearched(points.pixels[i])) continue;
+      result.pixels.push_back(points.pixels[i]);
+      result.descriptors.push_back(points.descriptors.row(static_cast<int>(i)));
+    }
   }
   return result;
 }

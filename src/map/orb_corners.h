@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "active_matching_slam/image/image_mask.h"
+
 namespace active_matching_slam {
 
 /// Image points with ORB descriptors.
@@ -12,8 +14,9 @@ struct DescribedPoints {
   cv::Mat descriptors;  ///< a row of 32 bytes for each
 };
 
-/// Corners of an 8-bit grey image at scales from enlarged to half, the largest first.
-DescribedPoints describeCorners(const cv::Mat& image);
+/// Corners of an 8-bit grey image at scales from enlarged to half, the largest first; of the part
+/// of it that is used.
+DescribedPoints describeCorners(const cv::Mat& image, const ImageMask& mask = {});
 
 /// Descriptor (1 x 32) at a point of a small image, by the same rules; empty when it has none.
 cv::Mat describePoint(const cv::Mat& image, const Eigen::Vector2d& point);

@@ -49,25 +49,48 @@ Relocaliser::Relocaliser(const RelocaliserOptions& options, const MapOptions& ma
 }
 
 std::optional<Relocalisation> Relocaliser::find(const CameraModel& camera, const cv::Mat& image,
-                                                const Ekf& filter, const FeatureMap& map) const {
+                                                const Ekf& filter, const FeatureMap& map,
+                                                const ImageMask& mask) const {
   if (image.type() != CV_8UC1 || image.cols != camera.width() || image.rows != camera.height())
     return std::nullopt;
   const std::vector<Landmark> landmarks = usableLandmarks(filter, map);
   if (static_cast<int>(landmarks.size()) < options_.minimum_inliers) return std::nullopt;
-  auto T_world_camera = solvePose(camera, matchDescriptors(image, landmarks));
+  const auto T_world_camera = solvePose(camera, matchDescriptors(image, landmarks, mask));
   if (!T_world_camera) return std::nullopt;
+  return prove(camera, image, landmarks, *T_world_camera, mask);
+}
 
+std::optional<Relocalisation> Relocaliser::findByMatches(
+    const CameraModel& camera, const cv::Mat& image, const Ekf& filter, const FeatureMap& map,
+    const std::vector<FeatureMeasurement>& matches, const ImageMask& mask) const {
+  const std::vector<Landmark> landmarks = usableLandmarks(filter, map);
+  std::vector<Sighting> sightings;
+  for (const FeatureMeasurement& match : matches) {
+    const auto landmark = std::find_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) {
+      return l.feature->id == match.id;
+    });
+    if (landmark != landmarks.end()) sightings.push_back({&*landmark, match.pixel});
+  }
+  const auto T_world_camera = solvePose(camera, sightings);
+  if (!T_world_camera) return std::nullopt;
+  return prove(camera, image, landmarks, *T_world_camera, mask);
+}
+
+std::optional<Relocalisation> Relocaliser::prove(const CameraModel& camera, const cv::Mat& image,
+                                                 const std::vector<Landmark>& landmarks,
+                                                 Eigen::Isometry3d T_world_camera,
+                                                 const ImageMask& mask) const {
   std::vector<Sighting> found;
-  searchVisible(camera, image, landmarks, *T_world_camera, kSearchRadiusPx, &found);
+  searchVisible(camera, image, landmarks, T_world_camera, kSearchRadiusPx, mask, &found);
   if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
-  *T_world_camera = refinePose(camera, found, *T_world_camera);
+  T_world_camera = refinePose(camera, found, T_world_camera);
 
   // The proof, with templates as the refined pose expects them.
   Relocalisation result;
   result.searched =
-      searchVisible(camera, image, landmarks, *T_world_camera, 2.0 * kInlierPx, &found);
+      searchVisible(camera, image, landmarks, T_world_camera, 2.0 * kInlierPx, mask, &found);
   if (static_cast<int>(found.size()) < options_.minimum_inliers) return std::nullopt;
-  result.T_world_camera = refinePose(camera, found, *T_world_camera);
+  result.T_world_camera = refinePose(camera, found, T_world_camera);
   double sum = 0.0;
   for (const Sighting& sighting : found) {
     const double distance = residual(camera, sighting, result.T_world_camera);
@@ -102,7 +125,7 @@ std::vector<Relocaliser::Landmark> Relocaliser::usableLandmarks(const Ekf& filte
 }
 
 std::vector<Relocaliser::Sighting> Relocaliser::matchDescriptors(
-    const cv::Mat& image, const std::vector<Landmark>& landmarks) const {
+    const cv::Mat& image, const std::vector<Landmark>& landmarks, const ImageMask& mask) const {
   cv::Mat descriptors;
   std::vector<const Landmark*> described;
   for (const Landmark& landmark : landmarks) {
@@ -112,7 +135,7 @@ std::vector<Relocaliser::Sighting> Relocaliser::matchDescriptors(
     descriptors.push_back(descriptor);
     described.push_back(&landmark);
   }
-  const DescribedPoints points = describeCorners(image);
+  const DescribedPoints points = describeCorners(image, mask);
   std::vector<Sighting> sightings;
   if (described.empty() || points.pixels.empty()) return sightings;
   cv::Mat distances;  // a row for each landmark
@@ -169,7 +192,7 @@ std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
 int Relocaliser::searchVisible(const CameraModel& camera, const cv::Mat& image,
                                const std::vector<Landmark>& landmarks,
                                const Eigen::Isometry3d& T_world_camera, double radius_px,
-                               std::vector<Sighting>* found) const {
+                               const ImageMask& mask, std::vector<Sighting>* found) const {
   const double maximum_angle = map_options_.maximum_view_angle_deg * M_PI / 180.0;
   std::vector<const Landmark*> visible;
   std::vector<Template> templates;
@@ -179,8 +202,8 @@ int Relocaliser::searchVisible(const CameraModel& camera, const cv::Mat& image,
                                        homogeneousPosition(*landmark.state));
     Template expected;
     if (!view || !camera.isInImage(view->pixel, image_options_.border_px) ||
-        view->view_angle_rad > maximum_angle || view->scale < map_options_.minimum_scale ||
-        view->scale > map_options_.maximum_scale ||
+        !mask.isSearched(view->pixel) || view->view_angle_rad > maximum_angle ||
+        view->scale < map_options_.minimum_scale || view->scale > map_options_.maximum_scale ||
         !warpTemplate(landmark.feature->patch, *view, image_options_.template_size_px, &expected) ||
         expected.contrast() < image_options_.minimum_contrast)
       continue;
@@ -190,7 +213,7 @@ int Relocaliser::searchVisible(const CameraModel& camera, const cv::Mat& image,
     ellipses.push_back({view->pixel, sigma * sigma * Eigen::Matrix2d::Identity()});
   }
   ImageFeatureSearch search(image_options_);
-  search.beginFrame(image, templates);
+  search.beginFrame(image, templates, {}, mask.templateCentres());
   found->clear();
   for (std::size_t i = 0; i < visible.size(); ++i) {
     search.search(static_cast<int>(i), ellipses[i]);

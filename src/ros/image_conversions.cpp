@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <boost/make_shared.hpp>
+#include <cmath>
+#include <cstring>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
+#include <utility>
 
 namespace active_matching_slam {
 namespace {
@@ -51,6 +54,22 @@ void checkLayout(const sensor_msgs::Image& message) {
                              " bytes, step x height is " + std::to_string(total));
 }
 
+bool hostIsBigEndian() {
+  const std::uint16_t one = 1;
+  std::uint8_t first = 0;
+  std::memcpy(&first, &one, 1);
+  return first == 0;
+}
+
+/// Of each 16-bit value, as versions of cv_bridge don't.
+void swapBytes(sensor_msgs::Image* message) {
+  for (std::size_t row = 0; row < message->height; ++row) {
+    std::uint8_t* const begin = &message->data[row * message->step];
+    for (std::size_t i = 0; i + 1 < message->step; i += 2) std::swap(begin[i], begin[i + 1]);
+  }
+  message->is_bigendian = hostIsBigEndian();
+}
+
 std::vector<double> knownCoefficients(const sensor_msgs::CameraInfo& message,
                                       DistortionModel model) {
   std::size_t known = 0;
@@ -73,7 +92,8 @@ std::vector<double> knownCoefficients(const sensor_msgs::CameraInfo& message,
     throw std::invalid_argument("camera_info.D has " + std::to_string(message.D.size()) +
                                 " coefficients, distortion model '" + message.distortion_model +
                                 "' has " + std::to_string(known));
-  return {message.D.begin(), message.D.begin() + std::min(known, message.D.size())};
+  return completeCoefficients(
+      model, {message.D.begin(), message.D.begin() + std::min(known, message.D.size())});
 }
 
 }  // namespace
@@ -82,11 +102,14 @@ cv::Mat toGrayImage(const sensor_msgs::Image& message) {
   checkLayout(message);
   try {
     sensor_msgs::ImageConstPtr source(&message, [](const sensor_msgs::Image*) {});
+    const bool swapped =
+        message.is_bigendian != hostIsBigEndian() && encodings::bitDepth(message.encoding) == 16;
     if (const std::string encoding = colorEncoding(message.encoding);
-        encoding != message.encoding) {
-      auto renamed = boost::make_shared<sensor_msgs::Image>(message);
-      renamed->encoding = encoding;
-      source = renamed;
+        encoding != message.encoding || swapped) {
+      auto changed = boost::make_shared<sensor_msgs::Image>(message);
+      changed->encoding = encoding;
+      if (swapped) swapBytes(changed.get());
+      source = changed;
     }
     const cv::Mat gray = cv_bridge::toCvCopy(source, encodings::MONO8)->image;
     if (gray.type() != CV_8UC1) throw std::runtime_error("it has no conversion to grey");
@@ -110,10 +133,18 @@ cv::Mat toGrayImage(const sensor_msgs::CompressedImage& message) {
   return gray;
 }
 
-CameraCalibration toCalibration(const sensor_msgs::CameraInfo& message) {
-  if (message.K[0] == 0.0)
+CameraCalibration toCalibration(const sensor_msgs::CameraInfo& message, bool rectified) {
+  if (rectified && message.P[0] == 0.0)
+    throw std::invalid_argument(
+        "the images are rectified, by their topic's name, but camera_info.P[0] is 0");
+  if (message.K[0] == 0.0 && !rectified)
     throw std::invalid_argument(
         "the camera is uncalibrated: camera_info.K[0] is 0 (calibrate it, or set camera_info_url)");
+  const double skew = rectified ? message.P[1] : message.K[1];
+  if (skew != 0.0)
+    throw std::invalid_argument("camera_info has a skew of " + std::to_string(skew) + " (" +
+                                (rectified ? "P" : "K") +
+                                "[1]): pixels that are no rectangles are not supported");
   const auto& roi = message.roi;
   if (std::max(message.width, message.height) > kLargestSide_px)
     throw std::invalid_argument("camera_info speaks of an image of " +
@@ -130,18 +161,67 @@ CameraCalibration toCalibration(const sensor_msgs::CameraInfo& message) {
   calibration.name = message.header.frame_id;
   calibration.width = static_cast<int>((roi.width ? roi.width : message.width) / binning_x);
   calibration.height = static_cast<int>((roi.height ? roi.height : message.height) / binning_y);
-  calibration.fx = message.K[0] / binning_x;
-  calibration.fy = message.K[4] / binning_y;
-  calibration.cx = (message.K[2] - roi.x_offset) / binning_x;
-  calibration.cy = (message.K[5] - roi.y_offset) / binning_y;
-  calibration.distortion_model = distortionModelFromName(message.distortion_model);
-  calibration.distortion = knownCoefficients(message, calibration.distortion_model);
+  calibration.fx = (rectified ? message.P[0] : message.K[0]) / binning_x;
+  calibration.fy = (rectified ? message.P[5] : message.K[4]) / binning_y;
+  calibration.cx = ((rectified ? message.P[2] : message.K[2]) - roi.x_offset) / binning_x;
+  calibration.cy = ((rectified ? message.P[6] : message.K[5]) - roi.y_offset) / binning_y;
+  if (!rectified) {
+    calibration.distortion_model = distortionModelFromName(message.distortion_model);
+    calibration.distortion = knownCoefficients(message, calibration.distortion_model);
+  }
   checkCalibration(calibration);
   return calibration;
 }
 
+bool isRectifiedTopic(const std::string& topic) {
+  return topic.find("/image_rect") != std::string::npos || topic.rfind("image_rect", 0) == 0;
+}
+
+std::vector<std::string> calibrationDoubts(const sensor_msgs::CameraInfo& message,
+                                           const CameraCalibration& calibration) {
+  std::vector<std::string> doubts = calibrationDoubts(calibration);
+  const auto offCentre = [](double centre, int size) { return std::abs(2.0 * centre - size); };
+  if (message.binning_x > 1 && offCentre(calibration.cx * message.binning_x, calibration.width) <
+                                   offCentre(calibration.cx, calibration.width))
+    doubts.push_back("binning_x is " + std::to_string(message.binning_x) +
+                     ", but K seems to be that of the binned image already (its centre, " +
+                     std::to_string(calibration.cx * message.binning_x) +
+                     ", is the middle of that): then binning must be 0");
+  return doubts;
+}
+
+sensor_msgs::CameraInfo toCameraInfoMsg(const CameraCalibration& calibration) {
+  sensor_msgs::CameraInfo info;
+  info.width = static_cast<std::uint32_t>(calibration.width);
+  info.height = static_cast<std::uint32_t>(calibration.height);
+  info.distortion_model = distortionModelName(calibration.distortion_model);
+  info.D = calibration.distortion;
+  info.K = {
+      calibration.fx, 0.0, calibration.cx, 0.0, calibration.fy, calibration.cy, 0.0, 0.0, 1.0};
+  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  info.P = {calibration.fx,
+            0.0,
+            calibration.cx,
+            0.0,
+            0.0,
+            calibration.fy,
+            calibration.cy,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0};
+  return info;
+}
+
+cv::Mat toMask(const sensor_msgs::Image& message) {
+  if (message.encoding != encodings::MONO8 && message.encoding != encodings::TYPE_8UC1)
+    throw std::runtime_error("the mask's encoding is '" + message.encoding + "', must be mono8");
+  return toGrayImage(message);
+}
+
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
-  return a.width == b.width && a.height == b.height && a.K == b.K && a.D == b.D &&
+  return a.width == b.width && a.height == b.height && a.K == b.K && a.D == b.D && a.P == b.P &&
          a.distortion_model == b.distortion_model && a.binning_x == b.binning_x &&
          a.binning_y == b.binning_y && a.roi.x_offset == b.roi.x_offset &&
          a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&

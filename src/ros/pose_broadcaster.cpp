@@ -1,10 +1,29 @@
 #include "active_matching_slam/ros/pose_broadcaster.h"
 
+#include <stdexcept>
+
 #include "active_matching_slam/ros/pose_conversions.h"
 
 namespace active_matching_slam {
 
+namespace {
+
+/// As many as a busy /tf has in a second. Cost: memory for so many messages.
+constexpr int kTransformQueueSize = 1000;
+
+std::string withoutSlash(const std::string& frame) {
+  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
+}
+
+}  // namespace
+
 PoseBroadcaster::PoseBroadcaster(const NodeOptions& options) : options_(options) {
+  if (options_.tf_mode == "camera") {
+    ros::NodeHandle node;
+    transforms_ = node.subscribe("/tf", kTransformQueueSize, &PoseBroadcaster::onTransforms, this);
+    static_transforms_ =
+        node.subscribe("/tf_static", kTransformQueueSize, &PoseBroadcaster::onTransforms, this);
+  }
   if (options_.tf_mode == "map_to_odom" || !options_.base_frame.empty())
     listener_ = std::make_unique<tf2_ros::TransformListener>(buffer_);
   if (options_.tf_mode == "camera" && !options_.map_frame.empty()) {
@@ -51,9 +70,51 @@ void PoseBroadcaster::send(const TrackedFrame& frame, const std::string& camera_
     sendMapToOdom(frame, camera_frame, stamp);
   } else if (options_.tf_mode == "camera") {
     const std::string& child = options_.base_frame.empty() ? camera_frame : options_.base_frame;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      child_frame_ = child;
+    }
     broadcaster_.sendTransform(toTransformMsg(frame.camera.poseWorldCamera() * T_camera_base, stamp,
                                               options_.world_frame, child));
   }
+}
+
+/// A frame has one parent: says so when another node gives ours a second.
+void PoseBroadcaster::onTransforms(const tf2_msgs::TFMessage& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const geometry_msgs::TransformStamped& transform : message.transforms) {
+    const std::string parent = withoutSlash(transform.header.frame_id);
+    if (child_frame_.empty() || withoutSlash(transform.child_frame_id) != child_frame_ ||
+        parent == options_.world_frame)
+      continue;
+    parents_warning_.say("Frame '" + child_frame_ + "' has two parents on tf, '" +
+                         options_.world_frame + "' by this node and '" + parent +
+                         "' by another: set base_frame to a frame without a parent, tf_mode to "
+                         "map_to_odom, or to none");
+  }
+}
+
+UncertainPose PoseBroadcaster::cameraOf(const UncertainPose& given, const std::string& frame_id,
+                                        const std::string& camera_frame) {
+  const std::string frame = withoutSlash(frame_id);
+  const bool in_map = frame == options_.map_frame && T_map_world_;
+  if (frame != options_.world_frame && !in_map)
+    throw std::invalid_argument("its frame_id is '" + frame_id + "', must be " +
+                                options_.world_frame +
+                                (T_map_world_ ? " or " + options_.map_frame : ""));
+  const Eigen::Isometry3d T_world_frame =
+      in_map ? T_map_world_->inverse() : Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d T_given_camera = Eigen::Isometry3d::Identity();
+  if (!options_.base_frame.empty()) {
+    const auto T_camera_base = cameraFromBase(camera_frame, ros::Time(0));
+    if (!T_camera_base)
+      throw std::invalid_argument("tf has no transform from " + options_.base_frame + " to " +
+                                  camera_frame);
+    T_given_camera = T_camera_base->inverse();
+  } else if (in_map) {
+    T_given_camera.linear() = bodyFromOptical().toRotationMatrix();
+  }
+  return transformed(given, T_world_frame, T_given_camera);
 }
 
 void PoseBroadcaster::sendMapToOdom(const TrackedFrame& frame, const std::string& camera_frame,

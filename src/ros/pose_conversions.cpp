@@ -1,5 +1,7 @@
 #include "active_matching_slam/ros/pose_conversions.h"
 
+#include <stdexcept>
+
 #include "active_matching_slam/math/rotation.h"
 
 namespace active_matching_slam {
@@ -101,6 +103,49 @@ nav_msgs::Odometry toOdometryMsg(const RigidBodyState& state, const std_msgs::He
   message.twist.twist.angular = toVectorMsg(state.angular_velocity_body);
   fillRowMajor(state.twist_covariance, &message.twist.covariance);
   return message;
+}
+
+UncertainPose fromPoseWithCovarianceMsg(const geometry_msgs::PoseWithCovariance& message) {
+  const auto& p = message.pose.position;
+  const auto& q = message.pose.orientation;
+  Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
+  UncertainPose pose{Eigen::Isometry3d::Identity(), Matrix6d::Zero()};
+  pose.T_parent_child.translation() << p.x, p.y, p.z;
+  if (!pose.T_parent_child.translation().allFinite() || !rotation.coeffs().allFinite() ||
+      !(rotation.norm() > 0.0))
+    throw std::invalid_argument("the pose is not finite, or its quaternion is zero");
+  pose.T_parent_child.linear() = rotation.normalized().toRotationMatrix();
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column)
+      pose.covariance(row, column) =
+          0.5 * (message.covariance[6 * row + column] + message.covariance[6 * column + row]);
+  for (const int first : {0, 3}) {
+    auto variances = pose.covariance.diagonal().segment<3>(first);
+    const double largest = variances.maxCoeff();
+    if (!pose.covariance.allFinite() || !(largest > 0.0) || variances.minCoeff() < 0.0)
+      throw std::invalid_argument(std::string("the covariance of the ") +
+                                  (first == 0 ? "position" : "rotation") +
+                                  " is zero, negative or not finite");
+    for (int i = 0; i < 3; ++i)
+      if (variances[i] == 0.0) variances[i] = largest;
+  }
+  return pose;
+}
+
+UncertainPose transformed(const UncertainPose& pose, const Eigen::Isometry3d& T_new_parent,
+                          const Eigen::Isometry3d& T_child_new) {
+  UncertainPose result;
+  result.T_parent_child = T_new_parent * pose.T_parent_child * T_child_new;
+  // The new child's origin is on a lever.
+  const Eigen::Vector3d lever = pose.T_parent_child.linear() * T_child_new.translation();
+  Matrix6d J = Matrix6d::Identity();
+  J.topRightCorner<3, 3>() << 0.0, lever.z(), -lever.y(), -lever.z(), 0.0, lever.x(), lever.y(),
+      -lever.x(), 0.0;
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = T_new_parent.linear();
+  J = (turn * J).eval();
+  result.covariance = J * pose.covariance * J.transpose();
+  return result;
 }
 
 Eigen::Quaterniond bodyFromOptical() {

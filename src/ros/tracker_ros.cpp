@@ -5,12 +5,16 @@
 #include <functional>
 #include <stdexcept>
 
+#include "active_matching_slam/image/image_mask.h"
 #include "active_matching_slam/ros/bound_options.h"
+#include "active_matching_slam/ros/image_conversions.h"
 
 namespace active_matching_slam {
 namespace {
 
 constexpr const char* kShuttingDown = "the tracker is shutting down";
+/// Masks that may lie unread. Cost: as CameraSubscription's, memory for so many pictures.
+constexpr int kMaskQueueSize = 50;
 
 }  // namespace
 
@@ -37,12 +41,18 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
       publisher_(private_node, settings_.node),
       broadcaster_(settings_.node),
       trajectory_(settings_.node.trajectory_length) {
+  if (!options_.mask_file.empty()) session_.setMask(readMask(options_.mask_file));
+  if (!options_.first_map.empty())
+    session_.setFirstMap(data_directory_.resolve(options_.first_map));
   worker_ = std::make_unique<FrameWorker<CameraImage>>(
       [this](const CameraImage& image) { process(image); });
   subscription_ = std::make_unique<CameraSubscription>(private_node, options_.camera_info_url,
                                                        options_.no_image_timeout_s);
+  masked_images_ =
+      std::make_unique<MaskedImages>([this](const CameraImage& image) { worker_->post(image); });
+  subscribeBeside();
   subscription_->start(options_.image_transport,
-                       [this](const CameraImage& image) { worker_->post(image); });
+                       [this](const CameraImage& image) { masked_images_->addImage(image); });
   diagnostics_.start([this] {
     return NodeDiagnostics::Images{subscription_->received(), worker_->dropped(),
                                    subscription_->silence(), subscription_->imageTopic()};
@@ -58,7 +68,11 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
           ? "scale is free: lengths are in map units until ~set_scale, or start from a known_target"
           : "scale comes from " + settings_.node.known_target;
   ROS_INFO_STREAM("Tracking images of " << subscription_->imageTopic() << " with "
-                                        << subscription_->infoTopic() << "; " << scale);
+                                        << subscription_->infoTopic()
+                                        << (isRectifiedTopic(subscription_->imageTopic())
+                                                ? " (rectified: its P, no distortion)"
+                                                : "")
+                                        << "; " << scale);
 }
 
 // A nodelet's callbacks run in other threads. Each source of them ends before what it asks.
@@ -66,6 +80,8 @@ TrackerRos::~TrackerRos() {
   diagnostics_.stop();
   services_.clear();
   reconfigure_.reset();
+  mask_.shutdown();
+  initial_pose_.shutdown();
   subscription_.reset();
   worker_->stop();
 }
@@ -87,7 +103,20 @@ void TrackerRos::track(const CameraImage& image) {
     // That camera_info is missing the subscription says itself.
     if (image.info) warning_.say(subscription_->imageTopic() + ": " + session_.fault());
   }
-  if (!frame) return;
+  if (!session_.maskFault().empty()) {
+    diagnostics_.recordFault(session_.maskFault());
+    warning_.say("mask",
+                 private_node_.resolveName("mask") + " is not used: " + session_.maskFault());
+  }
+  if (!frame) {
+    TrackedFrame told;
+    if (last_frame_) told = *last_frame_;
+    told.state = state_;
+    told.reason = session_.fault();
+    publisher_.publishState(told, image.header().stamp);
+    return;
+  }
+  last_frame_ = frame;
   noticeChanges(*frame, image.header().stamp);
   publisher_.publishState(*frame, image.header().stamp);
   if (!session_.fault().empty()) return;
@@ -99,7 +128,7 @@ void TrackerRos::track(const CameraImage& image) {
 void TrackerRos::publish(const TrackedFrame& frame, const CameraImage& image) {
   FrameContext context;
   context.stamp = image.header().stamp;
-  context.camera_frame = cameraFrame(image.header());
+  camera_frame_ = context.camera_frame = cameraFrame(image.header());
   context.body_frame = options_.base_frame.empty() ? context.camera_frame : options_.base_frame;
   context.dropped_images = worker_->dropped();
   if (frame.state == TrackingState::kTracking) {
@@ -158,6 +187,32 @@ std::string TrackerRos::cameraFrame(const std_msgs::Header& header) const {
                                                 << "' can't name the camera: using 'camera' (set "
                                                    "camera_frame)");
   return "camera";
+}
+
+void TrackerRos::subscribeBeside() {
+  const boost::function<void(const sensor_msgs::ImageConstPtr&)> take_mask =
+      [this](const sensor_msgs::ImageConstPtr& mask) { masked_images_->addMask(mask); };
+  mask_ = private_node_.subscribe<sensor_msgs::Image>("mask", kMaskQueueSize, take_mask);
+  // Beside the node, as the images are, where rviz publishes it.
+  initial_pose_ = private_node_.subscribe(
+      ros::names::append(ros::names::parentNamespace(private_node_.getNamespace()), "initialpose"),
+      1, &TrackerRos::onInitialPose, this);
+}
+
+void TrackerRos::onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+  try {
+    worker_->call([&] { setPose(message); });
+  } catch (const std::exception& error) {
+    ROS_WARN_STREAM("initialpose: refused: " << error.what());
+  }
+}
+
+/// In the worker's thread.
+void TrackerRos::setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
+  const UncertainPose given = fromPoseWithCovarianceMsg(message.pose);
+  const UncertainPose camera = broadcaster_.cameraOf(given, message.header.frame_id, camera_frame_);
+  session_.requireTracker().setPose(camera.T_parent_child, camera.covariance);
+  ROS_INFO("initialpose: looking for the camera there");
 }
 
 void TrackerRos::advertiseServices() {

@@ -27,7 +27,10 @@ bool TrackingSession::updateCamera(const CameraImage& image) {
   if (image.info != info_) {
     info_ = image.info;
     try {
-      takeCalibration(toCalibration(*info_));
+      const CameraCalibration calibration = toCalibration(*info_, image.rectified);
+      for (const std::string& doubt : calibrationDoubts(*info_, calibration))
+        warning_.say("This calibration can hardly be right: " + doubt);
+      takeCalibration(calibration);
       calibration_fault_.clear();
     } catch (const std::exception& error) {
       calibration_fault_ = error.what();
@@ -40,10 +43,29 @@ bool TrackingSession::updateCamera(const CameraImage& image) {
 void TrackingSession::takeCalibration(const CameraCalibration& calibration) {
   if (tracker_ && sameImaging(calibration, calibration_)) return;
   auto tracker = std::make_unique<Tracker>(CameraModel(calibration), demandedOptions());
+  try {
+    tracker->setMask(first_mask_);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(std::string("mask_file: ") + error.what());
+  }
+  if (!first_map_.empty()) tracker->loadMap(first_map_);
+  first_map_.clear();
+  mask_.reset();
   if (tracker_) warning_.say("camera_info has changed: started anew with an empty map");
   tracker_ = std::move(tracker);
   calibration_ = calibration;
   ++generation_;
+}
+
+void TrackingSession::updateMask(const sensor_msgs::ImageConstPtr& mask) {
+  if (!mask || mask == mask_) return;
+  mask_ = mask;
+  mask_fault_.clear();
+  try {
+    tracker_->setMask(toMask(*mask));
+  } catch (const std::exception& error) {
+    mask_fault_ = error.what();
+  }
 }
 
 std::shared_ptr<const TrackedFrame> TrackingSession::process(const CameraImage& image) {
@@ -53,6 +75,9 @@ std::shared_ptr<const TrackedFrame> TrackingSession::process(const CameraImage& 
     fault_ = "image without a stamp: ignored";
     return nullptr;
   }
+  fault_ = cameras_.faultOf(image.header());
+  if (!fault_.empty()) return nullptr;
+  updateMask(image.mask);
   try {
     const auto frame = tracker_->track(image.toGray(), image.header().stamp.toSec());
     if (frame->image.empty()) fault_ = frame->reason;

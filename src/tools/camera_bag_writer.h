@@ -3,7 +3,6 @@
 #include <cv_bridge/cv_bridge.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <rosbag/bag.h>
-#include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_msgs/String.h>
 #include <tf2_eigen/tf2_eigen.h>
@@ -17,33 +16,9 @@
 #include <string>
 
 #include "active_matching_slam/camera/camera_calibration.h"
+#include "active_matching_slam/ros/image_conversions.h"
 
 namespace active_matching_slam {
-
-/// The raw camera as camera_info states it: not rectified, so R is the identity and P repeats K.
-inline sensor_msgs::CameraInfo cameraInfoMsg(const CameraCalibration& calibration) {
-  sensor_msgs::CameraInfo info;
-  info.width = static_cast<std::uint32_t>(calibration.width);
-  info.height = static_cast<std::uint32_t>(calibration.height);
-  info.distortion_model = distortionModelName(calibration.distortion_model);
-  info.D = calibration.distortion;
-  info.K = {
-      calibration.fx, 0.0, calibration.cx, 0.0, calibration.fy, calibration.cy, 0.0, 0.0, 1.0};
-  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-  info.P = {calibration.fx,
-            0.0,
-            calibration.cx,
-            0.0,
-            0.0,
-            calibration.fy,
-            calibration.cy,
-            0.0,
-            0.0,
-            0.0,
-            1.0,
-            0.0};
-  return info;
-}
 
 /// Writes images of one camera, its camera_info and, where known, its true poses to a bag: the
 /// topics that the tracker subscribes to by default. The file appears under its name when close()
@@ -61,7 +36,7 @@ class CameraBagWriter {
   /// `compressed`: the images as JPEG on /camera/image_raw/compressed instead.
   CameraBagWriter(const std::string& path, const CameraCalibration& calibration,
                   const std::string& frame_id, bool compressed = false)
-      : path_(path), info_(cameraInfoMsg(calibration)), compressed_(compressed) {
+      : path_(path), info_(toCameraInfoMsg(calibration)), compressed_(compressed) {
     info_.header.frame_id = frame_id;
     bag_.open(partPath(), rosbag::bagmode::Write);
   }

@@ -191,8 +191,7 @@ int run(int argc, char** argv) {
       "track with a focal length and an image centre that are off by errors drawn from what the "
       "filter expects of them; else they are exact, and poses err less than it says");
   add("output", po::value(&arguments.output), "folder for consistency.csv and consistency.png");
-  po::variables_map values;
-  po::store(po::parse_command_line(argc, argv, options), values);
+  po::variables_map values = readArguments(argc, argv, options);
   if (values.count("help")) {
     std::cout
         << options

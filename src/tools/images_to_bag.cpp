@@ -223,6 +223,9 @@ cv::Mat toWritable(const cv::Mat& image, bool grey) {
 
 void convert(const Settings& settings) {
   const CameraCalibration calibration = readCalibrationYaml(settings.camera_info);
+  for (const std::string& doubt : calibrationDoubts(calibration))
+    std::cerr << "images_to_bag: " << settings.camera_info
+              << ": this calibration can hardly be right: " << doubt << "\n";
   const std::vector<TimedName> times =
       settings.times.empty() ? std::vector<TimedName>() : readTimes(settings.times);
   const std::vector<TimedPose> truth =
@@ -285,8 +288,7 @@ bool parse(int argc, char** argv, Settings* settings) {
       "frame of the images")("grey", po::bool_switch(&settings->grey), "write mono8")(
       "compressed", po::bool_switch(&settings->compressed),
       "write JPEG to /camera/image_raw/compressed");
-  po::variables_map values;
-  po::store(po::parse_command_line(argc, argv, options), values);
+  po::variables_map values = readArguments(argc, argv, options);
   if (values.count("help")) {
     std::cout << options;
     return false;

@@ -150,7 +150,7 @@ void printRosYaml() {
 
 int main(int argc, char** argv) {
   using namespace active_matching_slam;
-  const std::string what = argc > 1 ? argv[1] : "";
+  const std::string what = argc > 2 ? "two words" : argc > 1 ? argv[1] : "";
   if (what.empty()) {
     printTables();
   } else if (what == "--tracker-yaml") {

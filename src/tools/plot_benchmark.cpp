@@ -70,8 +70,7 @@ int plot(int argc, char** argv) {
        "output of a benchmark with --benchmark_format=json")     //
       ("output", po::value(&output)->required(), "the picture")  //
       ("title", po::value(&title)->default_value("processor time"), "above the picture");
-  po::variables_map values;
-  po::store(po::parse_command_line(argc, argv, options), values);
+  po::variables_map values = ams::readArguments(argc, argv, options);
   if (values.count("help")) {
     std::cout << options << '\n';
     return 0;

@@ -68,8 +68,7 @@ int run(int argc, char** argv) {
   add("bins", po::value(&bins)->default_value(10), "of equal width between weights 0 and 1");
   add("seed", po::value(&seed)->default_value(1), "of the frames");
   add("output", po::value(&output), "directory for reliability.csv and reliability.png");
-  po::variables_map values;
-  po::store(po::parse_command_line(argc, argv, options), values);
+  po::variables_map values = readArguments(argc, argv, options);
   if (values.count("help")) {
     std::cout
         << options

@@ -89,8 +89,7 @@ Arguments parseArguments(int argc, char** argv) {
   Arguments arguments;
   std::string size = "640x480";
   const po::options_description options = describeOptions(arguments, size);
-  po::variables_map values;
-  po::store(po::parse_command_line(argc, argv, options), values);
+  po::variables_map values = ams::readArguments(argc, argv, options);
   po::notify(values);
   if (arguments.show_help) std::cout << options << '\n';
   parseSize(size, arguments.simulator.width, arguments.simulator.height);
@@ -118,7 +117,7 @@ void writeMatrix(std::ostream& out, const std::string& name, int rows, int colum
 
 /// The file that camera_calibration writes and camera_info_manager reads.
 void writeCameraYaml(const std::string& path, const ams::CameraCalibration& calibration) {
-  const sensor_msgs::CameraInfo info = ams::cameraInfoMsg(calibration);
+  const sensor_msgs::CameraInfo info = ams::toCameraInfoMsg(calibration);
   std::ofstream out(path);
   out << std::setprecision(17) << "image_width: " << info.width << "\nimage_height: " << info.height
       << "\ncamera_name: " << calibration.name << '\n';

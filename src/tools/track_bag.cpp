@@ -16,6 +16,8 @@
 
 #include "active_matching_slam/evaluation/run_report.h"
 #include "active_matching_slam/evaluation/run_sequence.h"
+#include "active_matching_slam/image/image_mask.h"
+#include "active_matching_slam/ros/image_conversions.h"
 #include "active_matching_slam/ros/node_options.h"
 #include "active_matching_slam/tracker/tracker.h"
 #include "active_matching_slam/visualisation/debug_image.h"
@@ -32,21 +34,22 @@ namespace fs = boost::filesystem;
 namespace po = boost::program_options;
 
 struct Settings {
-  std::string bag, image_topic, camera_info_topic, camera_info, config, known_target, matcher;
-  std::string ground_truth, ground_truth_topic, output;
-  std::vector<std::string> set, draw;
+  std::string image_topic, camera_info_topic, camera_info, config, known_target, matcher;
+  std::string ground_truth, ground_truth_topic, output, mask, map;
+  std::vector<std::string> bags, set, draw;
   int features = 0;
   RunOptions run;
   bool ground_truth_topic_given = false, simulated = false, annotate = false;
-  bool output_bag = false;
+  bool output_bag = false, accept_calibration = false, localise = false;
 };
 
 po::options_description describeOptions(Settings* s) {
-  po::options_description options("track_bag --bag X.bag --output DIR [options]", 100);
+  po::options_description options("track_bag --bag X.bag [Y.bag ...] --output DIR [options]", 100);
   auto add = options.add_options();
   const auto text = [](std::string* target) { return po::value(target); };
   add("help,h", "this text");
-  add("bag", text(&s->bag)->required(), "bag to track");
+  add("bag", po::value(&s->bags)->multitoken()->composing()->required(),
+      "bag to track; several are one recording, in the order of its time");
   add("output", text(&s->output)->required(),
       "directory for trajectory.txt, statistics.csv, summary.json, trajectory.png, final.map (for "
       "~load_map) and the map's structure (mutual_information.csv, submaps.csv, "
@@ -55,7 +58,15 @@ po::options_description describeOptions(Settings* s) {
       "raw or compressed images");
   add("camera-info-topic", text(&s->camera_info_topic),
       "default: camera_info beside the image topic");
-  add("camera-info", text(&s->camera_info), "calibration yaml instead of a topic");
+  add("camera-info", text(&s->camera_info),
+      "calibration yaml instead of a topic: of camera_calibration, Kalibr or ORB-SLAM");
+  add("accept-calibration", po::bool_switch(&s->accept_calibration),
+      "go on with a calibration that can hardly be right");
+  add("mask", text(&s->mask),
+      "picture of the images' size: only where it is white images are used");
+  add("map", text(&s->map), "begin with a map that was saved before");
+  add("localise", po::bool_switch(&s->localise),
+      "follow the camera in that map, which stays as it is (mapping: false)");
   add("config", text(&s->config), "yaml with settings, as config/tracker.yaml");
   add("set", po::value(&s->set)->composing(), "one setting, as in map/maximum_features=80");
   add("known-target", text(&s->known_target), "yaml with known points: the map becomes metric");
@@ -95,21 +106,22 @@ TrackerOptions trackerOptionsOf(const Settings& settings) {
     // Room for those out of sight, too.
     options.map.maximum_features = std::max(options.map.maximum_features, 2 * settings.features);
   }
+  if (settings.localise) options.mapping = false;
   for (const std::string& assignment : settings.set) setTrackerOption(assignment, &options);
   checkTrackerOptions(options);
   return options;
 }
 
-RunTruth truthOf(const Settings& settings, const rosbag::Bag& bag) {
+RunTruth truthOf(const Settings& settings, const Bags& bags) {
   RunTruth truth;
-  truth.simulated = settings.simulated || bagHasTopic(bag, CameraBagWriter::kSimulationTopic);
+  truth.simulated = settings.simulated || bagHasTopic(bags, CameraBagWriter::kSimulationTopic);
   if (!settings.ground_truth.empty()) {
     truth.trajectory = readTrajectoryTum(settings.ground_truth);
     return truth;
   }
-  truth.trajectory = readBagTrajectory(bag, settings.ground_truth_topic);
+  truth.trajectory = readBagTrajectory(bags, settings.ground_truth_topic);
   if (truth.trajectory.empty() && settings.ground_truth_topic_given)
-    throw std::runtime_error(settings.bag + ": no geometry_msgs/PoseStamped on " +
+    throw std::runtime_error(settings.bags.front() + ": no geometry_msgs/PoseStamped on " +
                              settings.ground_truth_topic);
   return truth;
 }
@@ -160,8 +172,10 @@ void printSummary(const RunSummary& s, const std::string& output) {
   if (s.maps > 1)
     std::printf(", in %d maps, of which number %d has %d frames and the errors stated", s.maps,
                 s.main_map, s.frames_in_main_map);
+  if (s.late_images > 0) std::printf(", %d late images left out", s.late_images);
   print("ATE Sim(3)", s.ate_sim3_m, 1000.0, "mm");
-  print("ATE SE(3)", s.ate_se3_m, 1000.0, "mm");
+  // The unit of a free scale has nothing to do with the truth's.
+  if (s.scale_source != ScaleSource::kFree) print("ATE SE(3)", s.ate_se3_m, 1000.0, "mm");
   print("NEES", s.nees_mean, 1.0, "of 6");
   std::printf(", %.1f of %.1f matched", s.matched_mean, s.candidates_mean);
   if (!s.durations.empty())
@@ -172,23 +186,50 @@ void printSummary(const RunSummary& s, const std::string& output) {
   std::printf("\nwritten to %s\n", output.c_str());
 }
 
+void setMask(const std::string& path, Tracker* tracker) {
+  try {
+    tracker->setMask(readMask(path));
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+}
+
+CameraModel cameraOf(const Settings& settings, const Bags& bags, const std::string& image_topic) {
+  const bool rectified = isRectifiedTopic(image_topic);
+  const std::string info_topic = settings.camera_info_topic.empty() ? cameraInfoTopicOf(image_topic)
+                                                                    : settings.camera_info_topic;
+  std::vector<std::string> doubts;
+  CameraCalibration calibration;
+  if (settings.camera_info.empty()) {
+    calibration = readBagCalibration(bags, info_topic, rectified, &doubts);
+  } else {
+    calibration = readCalibrationYaml(settings.camera_info, rectified);
+    doubts = calibrationDoubts(calibration);
+  }
+  for (const std::string& doubt : doubts) {
+    const std::string text = (settings.camera_info.empty() ? info_topic : settings.camera_info) +
+                             ": this calibration can hardly be right: " + doubt;
+    if (!settings.accept_calibration)
+      throw std::runtime_error(text + " (--accept-calibration goes on with it)");
+    std::cerr << "track_bag: " << text << "\n";
+  }
+  return CameraModel(calibration);
+}
+
 void run(const Settings& settings) {
   const TrackerOptions options = trackerOptionsOf(settings);
-  const std::unique_ptr<rosbag::Bag> bag = openBag(settings.bag);
-  BagImageSource images(*bag, settings.image_topic);
-  const std::string info_topic = settings.camera_info_topic.empty()
-                                     ? cameraInfoTopicOf(images.topic())
-                                     : settings.camera_info_topic;
-  const CameraModel camera(settings.camera_info.empty()
-                               ? readBagCalibration(*bag, info_topic)
-                               : readCalibrationYaml(settings.camera_info));
+  const Bags bags = openBags(settings.bags);
+  BagImageSource images(bags, settings.image_topic);
+  const CameraModel camera = cameraOf(settings, bags, images.topic());
   RunReport report;
-  report.setTruth(truthOf(settings, *bag));
+  report.setTruth(truthOf(settings, bags));
   boost::system::error_code error;
   fs::create_directories(settings.output, error);
   if (error) throw std::runtime_error(settings.output + ": " + error.message());
 
   Tracker tracker(camera, options);
+  if (!settings.mask.empty()) setMask(settings.mask, &tracker);
+  if (!settings.map.empty()) tracker.loadMap(settings.map);
   std::unique_ptr<AnnotatedVideo> video;
   if (isAnnotated(settings))
     video = std::make_unique<AnnotatedVideo>(settings.output + "/annotated.avi",
@@ -214,8 +255,13 @@ void run(const Settings& settings) {
     });
   }
   report.write(settings.output);
-  if (has_map) tracker.saveMap(settings.output + "/final.map");
-  printSummary(report.summary(), settings.output);
+  if (has_map && options.mapping) tracker.saveMap(settings.output + "/final.map");
+  const RunSummary summary = report.summary();
+  printSummary(summary, settings.output);
+  if (summary.frames_tracked == 0)
+    throw std::runtime_error("no frame was tracked" + (summary.last_reason.empty()
+                                                           ? std::string()
+                                                           : ": " + summary.last_reason));
 }
 
 int trackBag(int argc, char** argv) {
@@ -223,14 +269,15 @@ int trackBag(int argc, char** argv) {
   Settings settings;
   const po::options_description options = describeOptions(&settings);
   return runTool("track_bag", [&] {
-    po::variables_map values;
-    po::store(po::parse_command_line(argc, argv, options), values);
+    po::variables_map values = readArguments(argc, argv, options);
     if (values.count("help")) {
       std::cout << options << "\n";
       return 0;
     }
     po::notify(values);
     settings.ground_truth_topic_given = !values["ground-truth-topic"].defaulted();
+    if (settings.localise && settings.map.empty())
+      throw std::runtime_error("--localise needs a --map");
     if (settings.run.every < 1) throw std::runtime_error("--every must be at least 1");
     if (values.count("features") && settings.features < 1)
       throw std::runtime_error("--features must be at least 1");

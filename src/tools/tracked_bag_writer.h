@@ -26,7 +26,7 @@ class TrackedBagWriter {
     bag_.write("/tracker/statistics", time, toStatisticsMsg(frame, 0, header));
     header.frame_id = kWorld;
     bag_.write("/tracker/map", time, toPointCloudMsg(frame, 0, header));
-    if (frame.state != TrackingState::kTracking) return;
+    if (frame.state != TrackingState::kTracking || frame.image.empty()) return;
     const RigidBodyState camera =
         rigidBodyState(frame.camera, frame.camera_covariance, Eigen::Isometry3d::Identity());
     bag_.write("/tracker/pose", time, toPoseWithCovarianceMsg(camera, header));

@@ -22,7 +22,7 @@ void FrameNoise::setOptions(const FilterOptions& options) {
 
 void FrameNoise::predict(const CameraModel& camera, double interval_s, Ekf* filter) {
   noise_.predict(interval_s);
-  filter->addLandmarkNoise(camera, interval_s, options_.landmark_noise_px);
+  if (filter) filter->addLandmarkNoise(camera, interval_s, options_.landmark_noise_px);
 }
 
 void FrameNoise::weigh(const std::function<bool(FeatureId)>& is_adjusted, const FeatureMap& map,

@@ -17,7 +17,8 @@ class FrameNoise {
   void setOptions(const FilterOptions& options);
   void reset() { noise_.reset(); }
 
-  /// Adds the landmarks' process noise of `interval_s`. After Ekf::predict().
+  /// Adds the landmarks' process noise of `interval_s` to `filter` (null: to none). After
+  /// Ekf::predict().
   void predict(const CameraModel& camera, double interval_s, Ekf* filter);
 
   /// Standard deviation per axis [px] that gates and matchers allow a match.

@@ -39,8 +39,9 @@ std::optional<MeasurementPrior> guidedPrior(const FrameState& frame,
   if (frame.reference_image.size() != frame.image.size()) return std::nullopt;
   const auto flow_px = trackPoints(frame.reference_image, frame.image, frame.reference_px);
   if (auto guided = conditionOnFlow(prior, flow_px, flowSigma_px(frame.image.cols))) return guided;
-  const auto motion = estimateImageMotion(frame.reference_image, frame.image,
-                                          predictedImageMotion(prior, frame.reference_px));
+  const auto motion =
+      estimateImageMotion(frame.reference_image, frame.image,
+                          predictedImageMotion(prior, frame.reference_px), frame.mask.used());
   if (!motion) return std::nullopt;
   return conditionOnImageMotion(prior, frame.reference_px, *motion);
 }
@@ -124,7 +125,7 @@ void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* 
 bool MatchCascade::retry(const MatchOptions& matching, const MeasurementPrior& prior,
                          FrameState* frame) const {
   ImageFeatureSearch search = frame->search;
-  search.beginFrame(frame->image, frame->templates, frame->sources);
+  search.beginFrame(frame->image, frame->templates, frame->sources, frame->mask.templateCentres());
   const double minimum_matches =
       std::max(options_.replacing_ratio * frame->matching.statistics.matched,
                options_.majority_fraction * expectedMatches(*frame));

@@ -72,6 +72,7 @@ void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->quality = quality_.quality();
   frame->quality_reason = quality_.cause();
   frame->accelerations = motion_noise_.expected();
+  frame->late_images = late_images_;
   for (const MapFeature& feature : map_.features()) {
     const FeatureState& state = *filter_.find(feature.id);
     TrackedFeature out;
@@ -127,8 +128,9 @@ void Tracker::Implementation::describeMatches(FrameState current, TrackedFrame* 
       it->matched_px = best->pixel;
       it->score = best->score;
     } else {
-      it->status = current.search.searchedPixels(i).size() > 0 ? FeatureStatus::kMissed
-                                                               : FeatureStatus::kNotSearched;
+      const bool is_missed =
+          current.search.searchedPixels(i).size() > 0 && !current.search.isPartlyMasked(i);
+      it->status = is_missed ? FeatureStatus::kMissed : FeatureStatus::kNotSearched;
     }
   }
 }

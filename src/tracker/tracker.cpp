@@ -29,7 +29,30 @@ class StopWatch {
 
 }  // namespace
 
+void Tracker::Implementation::setMask(const cv::Mat& used) {
+  if (used.empty()) {
+    mask_ = ImageMask();
+    return;
+  }
+  if (used.cols != working_.givenWidth() || used.rows != working_.givenHeight()) {
+    std::ostringstream fault;
+    fault << "the mask is " << used.cols << " x " << used.rows << ", the calibration "
+          << working_.givenWidth() << " x " << working_.givenHeight();
+    throw std::invalid_argument(fault.str());
+  }
+  if (used.type() != CV_8UC1) throw std::invalid_argument("the mask is not 8-bit grey");
+  mask_ = ImageMask(working_.reduce(used), options_.image);
+}
+
 void Tracker::Implementation::reset(const std::string& reason) {
+  is_pose_given_ = false;
+  if (!options_.mapping && map_.size() > 0) {
+    lookForCamera(reason);
+    previous_image_.release();
+    ++resets_;
+    ++jumps_;
+    return;
+  }
   lost_maps_.clear();
   awaits_loaded_map_ = false;
   abandonMap(reason);
@@ -79,6 +102,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
 void Tracker::Implementation::setScale(double factor) {
   if (!(factor > 0.0) || !std::isfinite(factor))
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
+  if (!options_.mapping) throw std::runtime_error("mapping is false: the map stays as it is");
   filter_.rescale(factor);
   motion_noise_.rescale(factor);
   map_.rescale(factor);
@@ -88,10 +112,11 @@ void Tracker::Implementation::setScale(double factor) {
 }
 
 /// Refuses what can't be tracked, and says why.
-bool Tracker::Implementation::accept(const cv::Mat& image, double stamp_s, TrackedFrame* frame) {
+bool Tracker::Implementation::accept(const cv::Mat& image, double stamp_s,
+                                     const std::string& why_empty, TrackedFrame* frame) {
   std::ostringstream fault;
   if (image.empty()) {
-    fault << "the image is empty";
+    fault << (why_empty.empty() ? "the image is empty" : why_empty);
   } else if (image.type() != CV_8UC1) {
     fault << "the image is not 8-bit grey";
   } else if (image.cols != working_.givenWidth() || image.rows != working_.givenHeight()) {
@@ -99,12 +124,16 @@ bool Tracker::Implementation::accept(const cv::Mat& image, double stamp_s, Track
           << working_.givenWidth() << " x " << working_.givenHeight();
   } else if (!std::isfinite(stamp_s)) {
     fault << "the stamp is not a finite number";
-  } else if (state_ != TrackingState::kWaiting && stamp_s < last_stamp_s_) {
+  } else if (state_ != TrackingState::kWaiting && stamp_s < last_stamp_s_ - kClockStep_s) {
     std::ostringstream reason;
     reason << "the stamp ran back by " << last_stamp_s_ - stamp_s << " s: started anew";
     reset(reason.str());
+    state_stamp_s_ = stamp_s;
     frame->reason = reason.str();
     return true;
+  } else if (state_ != TrackingState::kWaiting && stamp_s < last_stamp_s_) {
+    ++late_images_;
+    fault << "it is late, one with a later stamp came before it";
   } else if (state_ != TrackingState::kWaiting && stamp_s == last_stamp_s_) {
     fault << "the stamp equals the one before";
   } else {
@@ -138,12 +167,13 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
 }
 
 std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat& given,
-                                                                   double stamp_s) {
+                                                                   double stamp_s,
+                                                                   const std::string& fault) {
   auto frame = std::make_shared<TrackedFrame>();
   StopWatch total, stage;
   frame->stamp_s = stamp_s;
   frame->index = images_++;
-  if (!accept(given, stamp_s, frame.get())) {
+  if (!accept(given, stamp_s, fault, frame.get())) {
     frame->state = state_;
     describeState(frame.get());
     return frame;
@@ -151,17 +181,21 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   const cv::Mat image = working_.reduce(given);
   camera_ = camera_.corrected(filter_.camera().lens);
   frame->image = image;
-  frame->repeated_image = !previous_image_.empty() && isRepeatedImage(image, previous_image_);
+  frame->mask = mask_.used();
+  const cv::Mat used = mask_.applyTo(image);
+  frame->repeated_image = !previous_image_.empty() && isRepeatedImage(used, previous_image_);
   last_stamp_s_ = stamp_s;
 
   std::optional<FrameState> current;
   if (state_ == TrackingState::kWaiting || state_ == TrackingState::kInitialising) {
-    start(image, frame.get());
+    start(used, frame.get());
     state_stamp_s_ = stamp_s;
   } else if (state_ == TrackingState::kLost) {
-    predict(stamp_s - state_stamp_s_);
+    const double interval_s = stamp_s - state_stamp_s_;
+    predict(interval_s);
     state_stamp_s_ = stamp_s;
-    relocaliseWhileLost(image, frame.get());
+    if (!is_pose_given_ || !findNearGivenPose(used, interval_s, frame.get()))
+      relocaliseWhileLost(used, frame.get());
   } else if (!frame->repeated_image) {
     const double interval_s = stamp_s - state_stamp_s_;
     state_stamp_s_ = stamp_s;
@@ -171,12 +205,12 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     // worthless: the whole image is searched for the map first.
     const bool is_due = interval_s > options_.max_frame_interval_s ||
                         (poor_frames_ > 0 && poor_frames_ % kRelocalisationPeriodFrames == 0);
-    if (!is_due || !relocalise(image, frame.get()))
-      current.emplace(follow(image, interval_s, frame.get()));
+    if (!is_due || !relocalise(used, frame.get()))
+      current.emplace(follow(used, interval_s, frame.get()));
   }
-  previous_image_ = image.clone();  // the caller may use its memory again
+  previous_image_ = mask_.isWhole() ? image.clone() : used;  // the caller may reuse its memory
   if (poor_frames_ == 0) reference_image_ = previous_image_;
-  if (lookForOtherMaps(image, frame.get())) current.reset();
+  if (lookForOtherMaps(used, frame.get())) current.reset();
   frame->state = state_;
   if (!reason_.empty()) frame->reason = reason_;
   describeState(frame.get());
@@ -188,8 +222,14 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
 Tracker::Tracker(const CameraModel& camera, const TrackerOptions& options)
     : implementation_(std::make_unique<Implementation>(camera, options)) {}
 Tracker::~Tracker() = default;
-std::shared_ptr<const TrackedFrame> Tracker::track(const cv::Mat& image, double stamp_s) {
-  return implementation_->track(image, stamp_s);
+std::shared_ptr<const TrackedFrame> Tracker::track(const cv::Mat& image, double stamp_s,
+                                                   const std::string& fault) {
+  return implementation_->track(image, stamp_s, fault);
+}
+void Tracker::setMask(const cv::Mat& used) { implementation_->setMask(used); }
+void Tracker::setPose(const Eigen::Isometry3d& T_world_camera,
+                      const Eigen::Matrix<double, 6, 6>& covariance) {
+  implementation_->setPose(T_world_camera, covariance);
 }
 void Tracker::reset(const std::string& reason) { implementation_->reset(reason); }
 const TrackerOptions& Tracker::options() const { return implementation_->options(); }

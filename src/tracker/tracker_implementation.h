@@ -23,6 +23,9 @@ namespace active_matching_slam {
 /// Every how many frames relocalisation is attempted. Cost: an attempt takes as long as some
 /// frames.
 constexpr int kRelocalisationPeriodFrames = 4;
+/// A stamp that runs back by less is a late image; by more, the time is another [s]. Cost: with a
+/// clock that was set back no image is taken for so long.
+constexpr double kClockStep_s = 1.0;
 
 /// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
 /// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_lost.cpp and
@@ -42,23 +45,29 @@ class Tracker::Implementation {
     checkTrackerOptions(options);
   }
 
-  std::shared_ptr<const TrackedFrame> track(const cv::Mat& image, double stamp_s);
+  std::shared_ptr<const TrackedFrame> track(const cv::Mat& image, double stamp_s,
+                                            const std::string& fault);
   void reset(const std::string& reason);
   void setOptions(const TrackerOptions& options);
   void setScale(double factor);
   void saveMap(const std::string& path) const;
   void loadMap(const std::string& path);
+  void setMask(const cv::Mat& used);
+  void setPose(const Eigen::Isometry3d& T_world_camera,
+               const Eigen::Matrix<double, 6, 6>& covariance);
 
   const TrackerOptions& options() const { return options_; }
 
  private:
-  bool accept(const cv::Mat& image, double stamp_s, TrackedFrame* frame);
+  bool accept(const cv::Mat& image, double stamp_s, const std::string& why_empty,
+              TrackedFrame* frame);
   void start(const cv::Mat& image, TrackedFrame* frame);
   bool startFromKnownPoints(const cv::Mat& image, TrackedFrame* frame);
   bool initialise(const FrameState& current, TrackedFrame* frame);
   FrameState follow(const cv::Mat& image, double interval_s, TrackedFrame* frame);
   void predict(double interval_s);
   FrameState measure(const cv::Mat& image, double interval_s) const;
+  std::vector<VisibleFeature> visibleFeatures() const;
   void chooseCandidates(FrameState* current) const;
   void predictMeasurements(FrameState* current) const;
   void correct(FrameState* current, TrackedFrame* frame);
@@ -69,6 +78,7 @@ class Tracker::Implementation {
   bool giveUpWrongMap(const FrameState& current, TrackedFrame* frame);
   void updateTrackingState(const FrameState& current);
   void lose(const std::string& reason);
+  void lookForCamera(const std::string& reason);
   void relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame);
   bool relocalise(const cv::Mat& image, TrackedFrame* frame);
   void placeCamera(const Relocalisation& found, TrackedFrame* frame);
@@ -76,6 +86,8 @@ class Tracker::Implementation {
   bool lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame);
   void abandonMap(const std::string& reason);
   void clearMap();
+  bool findNearGivenPose(const cv::Mat& image, double interval_s, TrackedFrame* frame);
+  Corrected corrected() const { return options_.mapping ? Corrected::kAll : Corrected::kCamera; }
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
@@ -108,6 +120,7 @@ class Tracker::Implementation {
   WorkingSize working_;
   CameraModel camera_;  ///< of images of the working size
   TrackerOptions options_;
+  ImageMask mask_;
   Ekf filter_;
   FrameNoise noise_;
   MotionNoise motion_noise_;
@@ -138,8 +151,9 @@ class Tracker::Implementation {
   double state_stamp_s_ = 0.0;  ///< of the filter's state
   double lost_stamp_s_ = 0.0;   ///< when the camera was lost
   std::int64_t images_ = 0;
-  int resets_ = 0, times_lost_ = 0, jumps_ = 0;
-  int poor_frames_ = 0;  ///< with too few matches, in a row
+  int resets_ = 0, times_lost_ = 0, jumps_ = 0, late_images_ = 0;
+  bool is_pose_given_ = false;  ///< lost, but the filter's camera is where setPose() put it
+  int poor_frames_ = 0;         ///< with too few matches, in a row
 };
 
 }  // namespace active_matching_slam

@@ -1,3 +1,4 @@
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <sstream>
 #include <stdexcept>
@@ -28,7 +29,7 @@ bool Tracker::Implementation::giveUpWrongMap(const FrameState& current, TrackedF
   map_monitor_.add(last_stamp_s_, current.prior.size(),
                    static_cast<int>(current.measurements.size()),
                    measureImageQuality(current.image).sharpness);
-  if (!map_monitor_.isWrong() || map_monitor_.hasBeenRight()) return false;
+  if (!map_monitor_.isWrong() || map_monitor_.hasBeenRight() || !options_.mapping) return false;
   const std::string reason =
       "the map is wrong: half of what it predicts does not match in images as sharp as ever; "
       "started anew";
@@ -61,36 +62,41 @@ void Tracker::Implementation::updateTrackingState(const FrameState& current) {
 
 /// From here on no pose is claimed. The camera is taken to have stopped somewhere near.
 void Tracker::Implementation::lose(const std::string& reason) {
-  state_ = TrackingState::kLost;
-  reason_ = reason;
-  lost_stamp_s_ = last_stamp_s_;
-  poor_frames_ = 0;
+  lookForCamera(reason);
   ++times_lost_;
   map_monitor_.interrupt();
-  initialiser_.end();
   CameraState camera = filter_.camera();
   camera.velocity_world.setZero();
   camera.angular_velocity_camera.setZero();
   filter_.relocateCamera(camera, filter_.cameraCovariance());
 }
 
+void Tracker::Implementation::lookForCamera(const std::string& reason) {
+  state_ = TrackingState::kLost;
+  reason_ = reason;
+  lost_stamp_s_ = last_stamp_s_;
+  poor_frames_ = 0;
+  initialiser_.end();
+}
+
 /// What becomes of an image while the camera is lost.
 void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame) {
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
   // Lost soon after the start: nothing is known but directions.
-  if (!relocaliser_.canFind(filter_, map_)) {
+  if (options_.mapping && !relocaliser_.canFind(filter_, map_)) {
     abandonMap("lost with a map that has too few features of known depth: started anew");
     return;
   }
-  if (options_.reset_when_lost_after_s > 0.0 && lost_s >= options_.reset_when_lost_after_s) {
+  if (options_.mapping && options_.reset_when_lost_after_s > 0.0 &&
+      lost_s >= options_.reset_when_lost_after_s) {
     std::ostringstream reason;
     reason << "lost for " << lost_s << " s: started anew";
     abandonMap(reason.str());
     return;
   }
   if (frame->index % kRelocalisationPeriodFrames == 0 && relocalise(image, frame)) return;
-  if (options_.new_map_when_lost_after_s > 0.0 && lost_s >= options_.new_map_when_lost_after_s &&
-      !awaits_loaded_map_)
+  if (options_.mapping && options_.new_map_when_lost_after_s > 0.0 &&
+      lost_s >= options_.new_map_when_lost_after_s && !awaits_loaded_map_ && !is_pose_given_)
     beginNewMap(image, frame);
 }
 
@@ -153,7 +159,8 @@ bool Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFram
   if (lost_maps_.empty() || last_stamp_s_ - last_look_stamp_s_ < kLookPeriodS) return false;
   last_look_stamp_s_ = last_stamp_s_;
   const std::size_t k = next_lost_map_++ % lost_maps_.size();
-  const auto found = relocaliser_.find(camera_, image, lost_maps_[k].filter, lost_maps_[k].map);
+  const auto found =
+      relocaliser_.find(camera_, image, lost_maps_[k].filter, lost_maps_[k].map, mask_);
   if (!found) return false;
   LostMap left = storeMap();
   left.lost_stamp_s = last_stamp_s_;
@@ -169,10 +176,22 @@ bool Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFram
 /// Searches the whole image for the whole map. False when the camera is not found; the state is
 /// then as before.
 bool Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
-  const auto found = relocaliser_.find(camera_, image, filter_, map_);
-  if (!found) return false;
-  placeCamera(*found, frame);
-  return true;
+  const auto found = relocaliser_.find(camera_, image, filter_, map_, mask_);
+  if (found) placeCamera(*found, frame);
+  return found.has_value();
+}
+
+/// Searches the gates of a camera that is somewhere near where it was said to be. The matches must
+/// lead to a pose that stands the proof of any place; else the state is as before.
+bool Tracker::Implementation::findNearGivenPose(const cv::Mat& image, double interval_s,
+                                                TrackedFrame* frame) {
+  FrameState current = measure(image, interval_s);
+  current.reference_image.release();  // where that was taken is no better known
+  cascade_.match(options_.matching, options_.fallback_matchers, &current);
+  const auto found =
+      relocaliser_.findByMatches(camera_, image, filter_, map_, selectMeasurements(current), mask_);
+  if (found) placeCamera(*found, frame);
+  return found.has_value();
 }
 
 /// Puts the camera where it was found in the map.
@@ -189,20 +208,47 @@ void Tracker::Implementation::placeCamera(const Relocalisation& found, TrackedFr
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
   filter_.relocateCamera(camera, sigma.array().square().matrix().asDiagonal());
-  const UpdateReport report = filter_.update(camera_, found.inliers);
+  const UpdateReport report = filter_.update(camera_, found.inliers, {}, corrected());
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
   state_ = TrackingState::kTracking;
   reason_.clear();
   poor_frames_ = 0;
+  is_pose_given_ = false;
   awaits_loaded_map_ = false;
   motion_noise_.reset();
   initialiser_.end();
   ++jumps_;
 }
 
+void Tracker::Implementation::setPose(const Eigen::Isometry3d& T_world_camera,
+                                      const Eigen::Matrix<double, 6, 6>& covariance) {
+  if (map_.size() == 0) throw std::runtime_error("there is no map that the pose could be in");
+  if (!T_world_camera.matrix().allFinite()) throw std::invalid_argument("the pose is not finite");
+  const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+  if (!covariance.allFinite() || factor.info() != Eigen::Success)
+    throw std::invalid_argument("the pose's covariance is not positive definite");
+  lookForCamera("a pose was given: looking for the camera near it");
+  map_monitor_.interrupt();
+  is_pose_given_ = true;
+  CameraState camera;
+  camera.setPoseWorldCamera(T_world_camera);
+  MotionCovariance P = MotionCovariance::Zero();
+  P.topLeftCorner<6, 6>() = covariance;
+  const auto square = [](double x) { return x * x; };
+  P.diagonal()
+      .segment<3>(CameraError::kVelocity)
+      .setConstant(square(options_.filter.initial_sigma_velocity_mps));
+  P.diagonal()
+      .segment<3>(CameraError::kAngularVelocity)
+      .setConstant(square(options_.filter.initial_sigma_angular_velocity_rps));
+  filter_.relocateCamera(camera, P);
+}
+
 void Tracker::Implementation::saveMap(const std::string& path) const {
   if (map_.size() == 0) throw std::runtime_error("there is no map to save yet");
+  if (!options_.mapping)
+    throw std::runtime_error("mapping is false: the map is still as it was loaded");
   MapFileContent content;
   content.camera = camera_.calibration();
   content.camera_state = filter_.camera();
@@ -232,16 +278,13 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   map_.clear();
   for (const MapFeature& feature : content.map) map_.add(feature);
   scale_source_ = static_cast<ScaleSource>(content.scale_source);
-  initialiser_.end();
   structure_.clear();
   structure_snapshot_ = {};
   lost_maps_.clear();
   awaits_loaded_map_ = true;
   map_number_ = maps_begun_++;
-  state_ = TrackingState::kLost;
-  reason_ = "map loaded: looking for the camera in it";
-  lost_stamp_s_ = last_stamp_s_;
-  poor_frames_ = 0;
+  is_pose_given_ = false;
+  lookForCamera("map loaded: looking for the camera in it");
 }
 
 }  // namespace active_matching_slam

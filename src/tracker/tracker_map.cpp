@@ -31,6 +31,7 @@ void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedF
 }
 
 void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* frame) {
+  if (!options_.mapping) return;
   frame->features_converted = static_cast<int>(filter_.convertToPoints().size());
   retire(map_.failing(options_.map), frame);
   retire(map_.drifting(), frame);
@@ -38,8 +39,7 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   // The maximum may have been lowered.
   retire(map_.leastUseful(filter_, map_.size() - options_.map.maximum_features), frame);
   if (poor_frames_ > 0) return;  // where the camera is unsure, nothing new is put on the map
-  const std::vector<VisibleFeature> visible =
-      map_.visible(filter_, camera_, options_.map, options_.image.border_px);
+  const std::vector<VisibleFeature> visible = visibleFeatures();
   const int wanted =
       options_.map.features_per_frame - static_cast<int>(map_.expectedMatches(visible));
   if (wanted <= 0) return;
@@ -55,7 +55,7 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
 /// That match misses the landmark by its noise, and the new patch will go on to: so the landmark is
 /// taken to be that much off across its ray. Known points stay what they are.
 void Tracker::Implementation::retakePatches(const FrameState& current) {
-  if (poor_frames_ > 0 || !initialiser_.isDone()) return;
+  if (!options_.mapping || poor_frames_ > 0 || !initialiser_.isDone()) return;
   const double least_score = 0.5 * (1.0 + options_.image.match_threshold);
   for (std::size_t k = 0; k < current.measurements.size(); ++k) {
     const FeatureMeasurement& measurement = current.measurements[k];
@@ -159,7 +159,8 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
       options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
   int started = 0;
   std::vector<FeatureMeasurement> first_sights;
-  for (const Corner& corner : detectCorners(image, occupied, wanted, distance_px, options_.image)) {
+  for (const Corner& corner :
+       detectCorners(image, occupied, wanted, distance_px, options_.image, mask_.patchCentres())) {
     auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
                                     options_.image.source_patch_size_px);
     if (!patch) continue;

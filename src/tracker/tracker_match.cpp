@@ -24,12 +24,23 @@ void Tracker::Implementation::predict(double interval_s) {
   }
   interval_s = std::min(interval_s, options_.max_frame_interval_s);
   filter_.predict(interval_s, motion_noise_.expected());
-  noise_.predict(camera_, interval_s, &filter_);
+  noise_.predict(camera_, interval_s, options_.mapping ? &filter_ : nullptr);
+}
+
+/// Features that should be seen in the part of the image that is used.
+std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures() const {
+  std::vector<VisibleFeature> visible =
+      map_.visible(filter_, camera_, options_.map, options_.image.border_px);
+  const auto is_masked = [this](const VisibleFeature& feature) {
+    return !mask_.isSearched(feature.view.pixel);
+  };
+  visible.erase(std::remove_if(visible.begin(), visible.end(), is_masked), visible.end());
+  return visible;
 }
 
 /// Features that should be seen and the templates to search them by.
 void Tracker::Implementation::chooseCandidates(FrameState* current) const {
-  current->visible = map_.visible(filter_, camera_, options_.map, options_.image.border_px);
+  current->visible = visibleFeatures();
   auto chosen = map_.choose(current->visible, camera_, options_.map.features_per_frame);
   const Eigen::Isometry3d T_world_camera = filter_.camera().poseWorldCamera();
   for (VisibleFeature& feature : chosen) {
@@ -75,6 +86,7 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
 FrameState Tracker::Implementation::measure(const cv::Mat& image, double interval_s) const {
   FrameState current(options_.image);
   current.image = image;
+  current.mask = mask_;
   current.interval_s = interval_s;
   current.predicted_interval_s = std::min(interval_s, options_.max_frame_interval_s);
   current.poor_frames = poor_frames_;
@@ -94,7 +106,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
     current.reference_px.push_back(camera_.project(T_reference_world.linear() * point.head<3>() +
                                                    point.w() * T_reference_world.translation()));
   }
-  current.search.beginFrame(image, current.templates, current.sources);
+  current.search.beginFrame(image, current.templates, current.sources, mask_.templateCentres());
   return current;
 }
 
@@ -113,14 +125,14 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
   const bool are_depths_guessed = initialiser_.areDepthsGuessed();
   const NoisePrior prior = are_depths_guessed ? NoisePrior() : noise_.prior();
-  const UpdateReport report = filter_.update(camera_, current->measurements, prior);
+  const UpdateReport report = filter_.update(camera_, current->measurements, prior, corrected());
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 
   motion_noise_.countImage(current->is_jerk);
   if (!are_depths_guessed) motion_noise_.learn(report, allowed, current->predicted_interval_s);
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
-  learnSlopes(*current);
+  if (options_.mapping) learnSlopes(*current);
   recordSearches(*current, frame->index);
   if (!are_depths_guessed && !frame->repeated_image) judgeQuality(*current);
 }
@@ -152,15 +164,18 @@ void Tracker::Implementation::judgeQuality(const FrameState& current) {
   signs.variance_factor = noise_.varianceFactor();
   signs.matched = static_cast<int>(current.inliers.size());
   for (int i = 0; i < current.prior.size(); ++i) {
-    if (current.search.searchedPixels(i).size() == 0) continue;
+    const bool is_found = !current.search.matches(i).empty();
+    if (current.search.searchedPixels(i).size() == 0 ||
+        (!is_found && current.search.isPartlyMasked(i)))
+      continue;
     ++signs.predicted;
-    if (!current.search.matches(i).empty()) ++signs.rejected;
+    if (is_found) ++signs.rejected;
   }
   signs.rejected -= signs.matched;
   quality_.add(current.interval_s, signs, filter_.camera(), filter_.options());
 }
 
-/// The record of each feature that was searched.
+/// The record of each feature that was searched. One that may be behind the mask has not failed.
 void Tracker::Implementation::recordSearches(const FrameState& current, std::int64_t index) {
   std::vector<SearchRecord> records;
   std::size_t next = 0;
@@ -170,7 +185,7 @@ void Tracker::Implementation::recordSearches(const FrameState& current, std::int
     const Eigen::Vector2d innovation_px =
         used ? Eigen::Vector2d(current.measurements[next++].pixel - current.prior.mean(i))
              : Eigen::Vector2d::Zero();
-    if (used || pixels > 0.0)
+    if (used || (pixels > 0.0 && !current.search.isPartlyMasked(i)))
       records.push_back({current.prior.ids[i], used,
                          static_cast<std::int64_t>(current.search.matches(i).size()),
                          std::llround(pixels), innovation_px});

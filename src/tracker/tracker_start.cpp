@@ -30,6 +30,10 @@ KnownPoint reducedPoint(KnownPoint point, const WorkingSize& working) {
 }  // namespace
 
 void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
+  if (!options_.mapping) {
+    reason_ = "mapping is false, and no map has been loaded";
+    return;
+  }
   if (measureImageQuality(image).isBlank()) {
     state_ = TrackingState::kInitialising;
     reason_ = "the image is blank: nothing to start from";

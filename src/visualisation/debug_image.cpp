@@ -227,6 +227,13 @@ std::string shortCount(std::int64_t count) {
   return text;
 }
 
+/// The image with what was not used at half its brightness.
+cv::Mat darkened(const cv::Mat& image, const cv::Mat& mask) {
+  cv::Mat result = 0.5 * image;
+  image.copyTo(result, mask);
+  return result;
+}
+
 std::string statusText(const TrackedFrame& frame) {
   const MatchStatistics& s = frame.matching.statistics;
   if (frame.state != TrackingState::kTracking)
@@ -271,7 +278,7 @@ std::vector<LegendEntry> legendOf(const DrawOptions& options) {
 
 cv::Mat drawDebugImage(const TrackedFrame& frame, const DrawOptions& options, int submap_level) {
   if (frame.image.empty()) return {};
-  DebugCanvas canvas(frame.image);
+  DebugCanvas canvas(frame.mask.empty() ? frame.image : darkened(frame.image, frame.mask));
   const VisibleLinks visible(frame, options);
   if (options.links) drawLinks(visible, options.minimum_link_bits, &canvas);
   if (options.tree) drawTree(frame, visible, &canvas);

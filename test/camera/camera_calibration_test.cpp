@@ -148,6 +148,112 @@ TEST_F(CalibrationYaml, WithoutModelNameItIsPlumbBob) {
   EXPECT_EQ(read(size_ + matrix_ + coefficients).distortion_model, DistortionModel::kPlumbBob);
 }
 
+TEST_F(CalibrationYaml, AFisheyeAsOlderCalibratorsWriteItIsEquidistant) {
+  const std::string coefficients = "distortion_coefficients: {data: [0.1, 0.2, 0.3, 0.4]}\n";
+  for (const std::string model : {"camera_model: fisheye\n", "distortion_model: fisheye\n"}) {
+    const CameraCalibration c = read(size_ + matrix_ + model + coefficients);
+    EXPECT_EQ(c.distortion_model, DistortionModel::kEquidistant) << model;
+    EXPECT_EQ(c.distortion, (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
+  }
+  const CameraCalibration pinhole =
+      read(size_ + matrix_ + "camera_model: pinhole\n" + coefficients);
+  EXPECT_EQ(pinhole.distortion_model, DistortionModel::kPlumbBob);
+}
+
+TEST_F(CalibrationYaml, ZerosAtTheEndOfTheCoefficientsMayBeMissing) {
+  const auto D = [&](const std::string& model, const std::string& numbers) {
+    return read(size_ + matrix_ + "distortion_model: " + model +
+                "\ndistortion_coefficients: {data: [" + numbers + "]}\n")
+        .distortion;
+  };
+  EXPECT_EQ(D("plumb_bob", "0.1, 0.2"), (std::vector<double>{0.1, 0.2, 0.0, 0.0}));
+  EXPECT_EQ(D("equidistant", "0.1"), (std::vector<double>{0.1, 0.0, 0.0, 0.0}));
+  EXPECT_EQ(D("rational_polynomial", "0.1, 0, 0, 0, 0.2"),
+            (std::vector<double>{0.1, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.0}));
+}
+
+TEST_F(CalibrationYaml, OfKalibrIsRead) {
+  const std::string chain =
+      "cam0:\n  camera_model: pinhole\n  intrinsics: [458.6, 457.3, 367.2, 248.4]\n"
+      "  resolution: [752, 480]\n  distortion_coeffs: [-0.28, 0.07, 1e-4, 2e-5]\n";
+  const CameraCalibration c = read(chain + "  distortion_model: radtan\n");
+  EXPECT_EQ(c.width, 752);
+  EXPECT_EQ(c.height, 480);
+  EXPECT_EQ(c.fx, 458.6);
+  EXPECT_EQ(c.cy, 248.4);
+  EXPECT_EQ(c.distortion_model, DistortionModel::kPlumbBob);
+  EXPECT_EQ(c.distortion, (std::vector<double>{-0.28, 0.07, 1e-4, 2e-5}));
+  EXPECT_EQ(read(chain + "  distortion_model: equidistant\n").distortion_model,
+            DistortionModel::kEquidistant);
+  EXPECT_NAMES(faultOfText("cam0: {camera_model: omni}\n"), "omni");
+  EXPECT_NAMES(faultOfText(chain + "  distortion_model: fov\n"), "fov");
+}
+
+TEST_F(CalibrationYaml, OfOrbSlamIsRead) {
+  for (const std::string camera : {"Camera", "Camera1"}) {
+    const std::string settings = "%YAML:1.0\n---\n" + camera + ".fx: 517.3\n" + camera +
+                                 ".fy: 516.5\n" + camera + ".cx: 318.6\n" + camera +
+                                 ".cy: 255.3\n" + camera + ".k1: 0.26\n" + camera + ".k2: -0.95\n" +
+                                 camera + ".p1: -0.005\n" + camera + ".p2: 0.002\n" + camera +
+                                 ".k3: 1.16\nCamera.width: 640\n";
+    const CameraCalibration c = read(settings + "Camera.height: 480\nCamera.type: \"PinHole\"\n");
+    EXPECT_EQ(c.width, 640);
+    EXPECT_EQ(c.fx, 517.3);
+    EXPECT_EQ(c.distortion, (std::vector<double>{0.26, -0.95, -0.005, 0.002, 1.16}));
+    EXPECT_NAMES(faultOfText(settings), "Camera.height");
+    EXPECT_NAMES(faultOfText(settings + "Camera.height: 480\nCamera.type: Spherical\n"),
+                 "Spherical");
+  }
+}
+
+TEST_F(CalibrationYaml, OfOpenCvIsRead) {
+  EXPECT_EQ(read("%YAML:1.0\n---\n" + size_ +
+                 "camera_matrix: !!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n"
+                 "  data: [195, 0, 162, 0, 196, 125, 0, 0, 1]\n" +
+                 lens_)
+                .fy,
+            196.0);
+}
+
+TEST_F(CalibrationYaml, OfARectifiedImageIsItsProjection) {
+  const std::string projection =
+      "projection_matrix: {data: [180, 0, 160, 0, 0, 181, 121, 0, 0, 0, 1, 0]}\n";
+  std::ofstream(path_) << size_ + matrix_ + lens_ + projection;
+  const CameraCalibration c = readCalibrationYaml(path_, true);
+  EXPECT_EQ(c.fx, 180.0);
+  EXPECT_EQ(c.fy, 181.0);
+  EXPECT_EQ(c.cx, 160.0);
+  EXPECT_EQ(c.cy, 121.0);
+  EXPECT_FALSE(hasDistortion(c));
+  std::ofstream(path_) << size_ + matrix_ + lens_;
+  EXPECT_NAMES(faultOf([&] { readCalibrationYaml(path_, true); }), "projection_matrix");
+}
+
+TEST_F(CalibrationYaml, SkewIsRefused) {
+  EXPECT_NAMES(
+      faultOfText(size_ + "camera_matrix: {data: [195, 3, 162, 0, 196, 125, 0, 0, 1]}\n" + lens_),
+      "[fx, 0, cx");
+}
+
+TEST(CalibrationDoubts, NoLensInUseIsDoubted) {
+  for (const CameraCalibration& calibration : lenses())
+    EXPECT_TRUE(calibrationDoubts(calibration).empty()) << calibration.name;
+}
+
+TEST(CalibrationDoubts, WhatCanHardlyBeRightIsNamed) {
+  const auto doubtAbout = [](const std::function<void(CameraCalibration*)>& change) {
+    CameraCalibration calibration = makeCalibration(DistortionModel::kPlumbBob, {});
+    change(&calibration);
+    std::string text;
+    for (const std::string& doubt : calibrationDoubts(calibration)) text += doubt + "; ";
+    return text;
+  };
+  EXPECT_NAMES(doubtAbout([](CameraCalibration* c) { c->fx = c->fy = 0.8; }), "fx = 0.8 px");
+  EXPECT_NAMES(doubtAbout([](CameraCalibration* c) { c->fy = 30.0 * c->width; }), "fy = ");
+  EXPECT_NAMES(doubtAbout([](CameraCalibration* c) { c->cx = 0.2 * c->width; }), "cx = ");
+  EXPECT_NAMES(doubtAbout([](CameraCalibration* c) { c->cy = 0.8 * c->height; }), "cy = ");
+}
+
 TEST(CropAndBin, ShiftsThePrincipalPointThenDividesAllByTheBinning) {
   const CameraCalibration full = lenses()[2];
   const CameraCalibration part = cropAndBin(full, 100, 60, 401, 300, 2, 4);

@@ -68,6 +68,11 @@ class Shell:
         stem = BAG[:-len('.bag')]
         shutil.copy(stem + '.camera.yaml', str(self.folder / 'camera.yaml'))
         (self.folder / 'mine.yaml').write_text('filter: {sigma_px: 1.0}\n')
+        self.run('python3 -c "import harness, numpy; open(\'mask.png\', \'wb\').write(harness.png('
+                 'numpy.pad(numpy.full((200, 320), 255), ((0, 40), (0, 0)))))"')
+        (self.folder / 'ros_home' / PACKAGE).mkdir(parents=True)
+        self.run('track_bag --bag desk.bag --output mapped && cp mapped/final.map desk.map && '
+                 'cp desk.map ros_home/%s/' % PACKAGE)
 
     def start(self, command):
         process = subprocess.Popen(['bash', '-c', 'exec ' + command], cwd=str(self.folder),
@@ -203,7 +208,10 @@ class CommandsTest(unittest.TestCase):
             done = re.sub(r' (BAG|desk\.bag|--headless)', '', command) + ' desk.bag --headless'
             if done not in shown:
                 shown.add(done)
-                output = self.shell.run('%s/%s --built %s --output demo' % (SOURCE, done, BUILT))
+                # As on a computer that does not know its own name.
+                output = self.shell.run('ROS_HOSTNAME=nowhere.invalid %s/%s --built %s --output demo' %
+                                        (SOURCE, done, BUILT))
+                self.assertIn("doesn't know its own name 'nowhere.invalid'", output)
                 self.assertIn('demo/trajectory.png', output)
                 self.assertIn('demo/rviz.png', output)
         self.run_documented(DEMO, show)

@@ -85,6 +85,15 @@ class Documents(unittest.TestCase):
                 given = set(re.findall(r"(\w+):=", command.group(2)))
                 self.assertLessEqual(given, known, place)
 
+    def test_every_argument_of_the_tracker_can_be_given_to_the_other_launch_files(self):
+        def arguments(name):
+            launch = ElementTree.parse(str(SOURCE / "launch" / name)).getroot()
+            return {argument.get("name") for argument in launch.findall("arg")}
+        for name in ("play_bag.launch", "demo.launch"):
+            # Those with a value of the launch file's own are none of the user's.
+            missing = arguments("tracker.launch") - arguments(name) - {"shown_frame"}
+            self.assertFalse(missing, name)
+
     def test_every_tool_named_exists_and_has_the_options_given(self):
         tools = {path.stem for path in (SOURCE / "src" / "tools").glob("*.cpp")}
         for place, line in lines():

@@ -173,11 +173,11 @@ class Feeder:
         return states
 
     def feed_in_vain(self, image, info=None, patience_s=0.3):
-        """An image that must not be answered. The answer, should there be one."""
+        """An image that must not be tracked. The answer, should there be one without a reason."""
         self._send(image, info)
         threading.Event().wait(patience_s)
         answers = [inbox.wait_for_stamp(image.header.stamp, 0.0) for inbox in self.states.values()]
-        return next((answer for answer in answers if answer is not None), None)
+        return next((answer for answer in answers if answer is not None and not answer.reason), None)
 
     def _send(self, image, info):
         if info is not None:

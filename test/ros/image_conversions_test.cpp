@@ -68,6 +68,26 @@ TEST(ImageConversions, SixteenBitsAreScaledToEight) {
         << encoding;
 }
 
+TEST(ImageConversions, SixteenBitsMayComeInEitherOrderOfBytes) {
+  cv::Mat deep;
+  shadedImage().convertTo(deep, CV_16UC1, 257.0);
+  deep += cv::Scalar(100.0);  // so that the two bytes differ
+  for (const char* encoding : {"mono16", "16UC1"}) {
+    const cv::Mat expected = toGrayImage(makeImage(encoding, deep));
+    sensor_msgs::Image swapped = makeImage(encoding, deep);
+    for (std::size_t i = 0; i < swapped.data.size(); i += 2)
+      std::swap(swapped.data[i], swapped.data[i + 1]);
+    swapped.is_bigendian = !swapped.is_bigendian;
+    EXPECT_EQ(0.0, cv::norm(expected, toGrayImage(swapped), cv::NORM_INF)) << encoding;
+  }
+}
+
+TEST(ImageConversions, AMaskIsGreyOrRefusedByName) {
+  EXPECT_EQ(0.0, cv::norm(shadedImage(), toMask(makeImage("mono8", shadedImage()))));
+  const cv::Mat colour(4, 4, CV_8UC3, cv::Scalar(200, 0, 0));
+  EXPECT_NE(std::string::npos, faultOf([&] { toMask(makeImage("bgr8", colour)); }).find("'bgr8'"));
+}
+
 TEST(ImageConversions, BayerMosaicsOfAGreySceneBecomeThatScene) {
   const cv::Mat gray = shadedImage();
   const cv::Rect inner(2, 2, gray.cols - 4, gray.rows - 4);
@@ -131,6 +151,8 @@ TEST(CameraInfo, ShortDistortionIsReadOnlyAsFarAsItGoes) {
   sensor_msgs::CameraInfo info = makeInfo();
   info.D = {0.1, -0.2, 0.001, 0.002};
   EXPECT_EQ(4u, toCalibration(info).distortion.size());
+  info.D = {0.1, -0.2};
+  EXPECT_EQ((std::vector<double>{0.1, -0.2, 0.0, 0.0}), toCalibration(info).distortion);
   info.D.clear();
   EXPECT_NO_THROW(toCalibration(info));
   info.distortion_model = "";
@@ -162,6 +184,38 @@ TEST(CameraInfo, BinningAndRegionOfInterestMoveTheCalibration) {
   EXPECT_DOUBLE_EQ((243.0 - 40.0) / 2, calibration.cy);
   info.roi.x_offset = 400;
   EXPECT_NE(std::string::npos, faultOf([&] { toCalibration(info); }).find("roi"));
+}
+
+TEST(CameraInfo, OfBinnedImagesWhoseMatrixIsBinnedAlreadyIsDoubted) {
+  sensor_msgs::CameraInfo info = makeInfo();
+  info.binning_x = info.binning_y = 2;
+  EXPECT_TRUE(calibrationDoubts(info, toCalibration(info)).empty());
+  for (double& number : info.K) number *= 0.5;
+  const auto doubts = calibrationDoubts(info, toCalibration(info));
+  ASSERT_FALSE(doubts.empty());
+  EXPECT_NE(std::string::npos, doubts.back().find("binning")) << doubts.back();
+}
+
+TEST(CameraInfo, OfRectifiedImagesIsTheProjection) {
+  EXPECT_TRUE(isRectifiedTopic("/camera/image_rect"));
+  EXPECT_TRUE(isRectifiedTopic("/camera/image_rect_color/compressed"));
+  EXPECT_FALSE(isRectifiedTopic("/camera/image_raw"));
+  EXPECT_FALSE(isRectifiedTopic("/rectangle/image"));
+  sensor_msgs::CameraInfo info = makeInfo();
+  EXPECT_NE(std::string::npos, faultOf([&] { toCalibration(info, true); }).find("P[0]"));
+  info.P = {450, 0, 310, 0, 0, 451, 240, 0, 0, 0, 1, 0};
+  const CameraCalibration calibration = toCalibration(info, true);
+  EXPECT_EQ(450.0, calibration.fx);
+  EXPECT_EQ(451.0, calibration.fy);
+  EXPECT_EQ(310.0, calibration.cx);
+  EXPECT_EQ(240.0, calibration.cy);
+  EXPECT_FALSE(hasDistortion(calibration));
+}
+
+TEST(CameraInfo, SkewIsRefusedByName) {
+  sensor_msgs::CameraInfo info = makeInfo();
+  info.K[1] = 3.0;
+  EXPECT_NE(std::string::npos, faultOf([&] { toCalibration(info); }).find("skew"));
 }
 
 TEST(CameraInfo, AnUncalibratedCameraIsNamed) {

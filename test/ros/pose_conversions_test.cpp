@@ -4,7 +4,10 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <functional>
 #include <random>
+
+#include "support/fault.h"
 
 namespace active_matching_slam {
 namespace {
@@ -163,6 +166,55 @@ TEST(PoseConversions, TransformMapsPointsOfTheChildIntoTheParent) {
   const Eigen::Vector3d ahead_camera(0, 0, 1);
   EXPECT_TRUE((fromTransformMsg(message.transform) * ahead_camera)
                   .isApprox(T_world_camera * ahead_camera, 1e-12));
+}
+
+TEST(UncertainPose, OfAnotherChildIsAsThatOfABodyOnALever) {
+  const UncertainPose camera{movingCamera().poseWorldCamera(),
+                             lopsidedCovariance().topLeftCorner<6, 6>()};
+  const RigidBodyState body = rigidBodyState(movingCamera(), lopsidedCovariance(), leverArm());
+  const UncertainPose moved = transformed(camera, Eigen::Isometry3d::Identity(), leverArm());
+  EXPECT_TRUE(moved.T_parent_child.isApprox(body.T_world_body, 1e-12));
+  EXPECT_TRUE(moved.covariance.isApprox(body.pose_covariance, 1e-9));
+}
+
+TEST(UncertainPose, ThereAndBackIsTheSame) {
+  const UncertainPose camera{movingCamera().poseWorldCamera(),
+                             lopsidedCovariance().topLeftCorner<6, 6>()};
+  Eigen::Isometry3d T_map_world = leverArm();
+  const UncertainPose again = transformed(transformed(camera, T_map_world, leverArm()),
+                                          T_map_world.inverse(), leverArm().inverse());
+  EXPECT_TRUE(again.T_parent_child.isApprox(camera.T_parent_child, 1e-12));
+  EXPECT_TRUE(again.covariance.isApprox(camera.covariance, 1e-9));
+}
+
+TEST(UncertainPose, OfRvizHasWhatItLeavesOutAsUnknown) {
+  geometry_msgs::PoseWithCovariance message;
+  message.pose.orientation.w = 1.0;
+  message.covariance[0] = message.covariance[7] = 0.25;
+  message.covariance[35] = 0.07;
+  const UncertainPose pose = fromPoseWithCovarianceMsg(message);
+  Eigen::Matrix<double, 6, 1> expected;
+  expected << 0.25, 0.25, 0.25, 0.07, 0.07, 0.07;
+  EXPECT_EQ(pose.covariance, Matrix6d(expected.asDiagonal()));
+}
+
+TEST(UncertainPose, WhatIsNoneIsRefusedByName) {
+  const auto fault = [](const std::function<void(geometry_msgs::PoseWithCovariance*)>& spoil) {
+    geometry_msgs::PoseWithCovariance message;
+    message.pose.orientation.w = 1.0;
+    for (int i = 0; i < 6; ++i) message.covariance[7 * i] = 0.1;
+    spoil(&message);
+    return faultOf([&] { fromPoseWithCovarianceMsg(message); });
+  };
+  EXPECT_EQ(fault([](auto*) {}), "");
+  EXPECT_NE(fault([](auto* m) { m->pose.orientation.w = 0.0; }).find("quaternion"),
+            std::string::npos);
+  EXPECT_NE(fault([](auto* m) { m->pose.position.x = NAN; }).find("finite"), std::string::npos);
+  EXPECT_NE(fault([](auto* m) { m->covariance[7] = -1.0; }).find("position"), std::string::npos);
+  EXPECT_NE(fault([](auto* m) {
+              m->covariance[21] = m->covariance[28] = m->covariance[35] = 0.0;
+            }).find("rotation"),
+            std::string::npos);
 }
 
 TEST(PoseConversions, OpticalAxesBecomeBodyAxes) {

@@ -175,7 +175,7 @@ TEST(Tracker, RefusesBadImagesBeforeTheFirstGoodOne) {
 
 TEST(Tracker, StartsAnewWhenTheStampRunsBackAndSaysSo) {
   Tracker tracker = slowTracker();
-  trackFrames(slowFilm(), &tracker, 10, 20);
+  trackFrames(slowFilm(), &tracker, 40, 50);
   const auto frame = tracker.track(slowFilm().frames[5].image, slowFilm().frames[5].stamp_s);
   EXPECT_EQ(frame->resets, 1);
   EXPECT_NE(frame->reason.find("stamp ran back"), std::string::npos) << frame->reason;
@@ -185,6 +185,31 @@ TEST(Tracker, StartsAnewWhenTheStampRunsBackAndSaysSo) {
   EXPECT_EQ(next->state, TrackingState::kTracking);
   EXPECT_EQ(next->reason, "");
   EXPECT_EQ(next->resets, 1);
+}
+
+TEST(Tracker, ALateImageIsLeftOutAndCountedAndTheMapIsKept) {
+  const Film& film = slowFilm();
+  Tracker tracker = slowTracker(), undisturbed = slowTracker();
+  trackFrames(film, &tracker, 0, 30);
+  trackFrames(film, &undisturbed, 0, 30);
+  const auto late = tracker.track(film.frames[28].image, film.frames[28].stamp_s);
+  EXPECT_NE(late->reason.find("late"), std::string::npos) << late->reason;
+  EXPECT_EQ(late->late_images, 1);
+  EXPECT_TRUE(late->image.empty()) << "nothing was made of it";
+  const Frames after = trackFrames(film, &tracker, 30, 40);
+  const Frames expected = trackFrames(film, &undisturbed, 30, 40);
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(sameState(*after[i], *expected[i])) << "frame " << i;
+}
+
+TEST(Tracker, AClockSetBackByALittleThrowsNothingAway) {
+  Film film = slowFilm();
+  for (std::size_t i = 30; i < film.frames.size(); ++i) film.frames[i].stamp_s -= 0.04;
+  Tracker tracker(film.camera, {});
+  const Frames frames = trackFrames(film, &tracker, 0, 60);
+  EXPECT_EQ(frames.back()->state, TrackingState::kTracking);
+  EXPECT_EQ(frames.back()->resets, 0);
+  EXPECT_EQ(frames.back()->times_lost, 0);
+  EXPECT_EQ(frames.back()->late_images, 1);
 }
 
 TEST(Tracker, IsAsNewAfterAReset) {

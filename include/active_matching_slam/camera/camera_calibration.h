@@ -25,6 +25,9 @@ struct CameraCalibration {
 /// A zero focal length is named as what it means in camera_info: an uncalibrated camera.
 void checkCalibration(const CameraCalibration& calibration);
 
+/// Coefficients as the model counts them: zeros at the end may have been left out.
+std::vector<double> completeCoefficients(DistortionModel model, std::vector<double> coefficients);
+
 /// Whether any coefficient of distortion is not zero. A real lens of which none is was not
 /// calibrated, but taken for what it is sold as.
 bool hasDistortion(const CameraCalibration& calibration);
@@ -32,14 +35,20 @@ bool hasDistortion(const CameraCalibration& calibration);
 /// True when both take the same pictures: all but their names agree.
 bool sameImaging(const CameraCalibration& a, const CameraCalibration& b);
 
-/// Name used in camera_info ("plumb_bob", ...; "" and "none" mean no distortion). Throws
-/// std::invalid_argument for a model that is not supported, naming it.
+/// What makes one doubt that a calibration is that of its images; empty: nothing. A lens that sees
+/// wider or narrower than any is likely to, or a centre far from the middle of the image.
+std::vector<std::string> calibrationDoubts(const CameraCalibration& calibration);
+
+/// Name used in camera_info ("plumb_bob", ...; "" and "none" mean no distortion; "fisheye", as
+/// older calibrators and OpenCV call it, is equidistant). Throws std::invalid_argument for a model
+/// that is not supported, naming it.
 DistortionModel distortionModelFromName(const std::string& name);
 std::string distortionModelName(DistortionModel model);
 
-/// Reads a camera_info yaml file as written by camera_calibration. Throws std::runtime_error that
-/// names the file and the field at fault.
-CameraCalibration readCalibrationYaml(const std::string& path);
+/// Reads a camera_info yaml file as written by camera_calibration; or one of Kalibr (its cam0), or
+/// of ORB-SLAM 2 or 3 (pinhole cameras and KannalaBrandt8). `rectified`: of the rectified image, by
+/// its projection_matrix. Throws std::runtime_error that names the file and the field at fault.
+CameraCalibration readCalibrationYaml(const std::string& path, bool rectified = false);
 
 /// Calibration of the image that a camera with a region of interest and binning delivers, from that
 /// of its full sensor. As sensor_msgs/CameraInfo defines it: the region is in full-resolution

@@ -15,6 +15,7 @@ struct FrameRecord {
   TrackingState state = TrackingState::kWaiting;
   std::string reason;
   bool repeated_image = false;
+  bool ignored_image = false;  ///< late, broken or of another size: nothing was made of it
   ScaleSource scale_source = ScaleSource::kFree;
   StampedPose pose;    ///< a claim only when the state is kTracking
   double speed = 0.0;  ///< [m/s]
@@ -27,7 +28,7 @@ struct FrameRecord {
   int map_features = 0, map_points = 0;  ///< all, and those converted from inverse depth
   int missed = 0, rejected = 0;
   int features_started = 0, features_retired = 0, features_converted = 0, features_failed = 0;
-  int resets = 0, times_lost = 0;
+  int resets = 0, times_lost = 0, late_images = 0;
   int map = 0, jumps = 0;
   double quality = 1.0;
   std::string quality_reason;
@@ -35,7 +36,7 @@ struct FrameRecord {
   MatchStatistics matching;
   FrameTimings timings_ms;
 
-  bool isTracked() const { return state == TrackingState::kTracking; }
+  bool isTracked() const { return state == TrackingState::kTracking && !ignored_image; }
 };
 
 FrameRecord recordOf(const TrackedFrame& frame);

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "active_matching_slam/tracker/tracker.h"
 
@@ -13,6 +14,8 @@ class ImageSource {
   virtual ~ImageSource() = default;
   /// False at the end. `image`: 8-bit grey. May throw what its recording makes it throw.
   virtual bool next(cv::Mat* image, double* stamp_s) = 0;
+  /// Why the image delivered last is empty; empty when it is not.
+  virtual std::string fault() const { return ""; }
   /// Steps over one image without decoding it; false at the end.
   virtual bool skip() = 0;
 };

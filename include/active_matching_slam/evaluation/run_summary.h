@@ -38,6 +38,8 @@ struct RunSummary {
   int frames_tracked = 0;
   int times_lost = 0;
   int resets = 0;
+  int late_images = 0;
+  std::string last_reason;  ///< of the last frame that has one: why its state is what it is
   std::string matcher;
   ScaleSource scale_source = ScaleSource::kFree;  ///< at the end
   double duration_s = 0.0;                        ///< from first to last stamp

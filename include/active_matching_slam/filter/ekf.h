@@ -53,6 +53,10 @@ struct ImpulseEstimate {
   double squares = 0.0, degrees = 0.0;
 };
 
+/// What an update corrects: all, or the camera alone, for which the uncertainty of the map counts,
+/// but of the map nothing changes (consider states: Schmidt 1966).
+enum class Corrected { kAll, kCamera };
+
 struct UpdateReport {
   int used = 0;
   int skipped = 0;      ///< unknown id, not finite, or behind the camera
@@ -146,7 +150,7 @@ class Ekf {
   /// independent of the past, by R.
   UpdateReport update(const CameraModel& camera,
                       const std::vector<FeatureMeasurement>& measurements,
-                      const NoisePrior& noise = {});
+                      const NoisePrior& noise = {}, Corrected corrected = Corrected::kAll);
 
   /// Takes the present map's scale as the unit: fuses, without moving the mean, that the mean
   /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this
@@ -188,6 +192,8 @@ class Ekf {
   bool correctCovariance(const Eigen::MatrixXd& C, const Eigen::MatrixXd& L,
                          const Eigen::MatrixXd& PL, const MotionCovariance& added, int columns,
                          Eigen::Ref<Eigen::MatrixXd> X);
+  /// P <- P - X X^T + D, but for the map's own block.
+  bool correctCameraCovariance(const MotionCovariance& added, const Eigen::MatrixXd& X);
   bool repairVariances(const Eigen::VectorXd& before);
 
   /// Of the last prediction: unknown velocities of `variance` (linear, angular) moved the camera's

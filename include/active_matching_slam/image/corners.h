@@ -19,9 +19,11 @@ struct Corner {
 /// `occupied` points first, and in each the strongest corner that keeps `minimum_distance_px` from
 /// every occupied point and every corner chosen before. Corners keep far enough from the border for
 /// a source patch, and none is weaker than options.corner_quality times the strongest met. Only the
-/// cells looked at are processed. In order of choice; empty for an empty image.
+/// cells looked at are processed. In order of choice; empty for an empty image. None lies where
+/// `centres` (CV_8U, of the image's size; empty: anywhere) is 0.
 std::vector<Corner> detectCorners(const cv::Mat& image,
                                   const std::vector<Eigen::Vector2d>& occupied, int wanted,
-                                  double minimum_distance_px, const ImageOptions& options);
+                                  double minimum_distance_px, const ImageOptions& options,
+                                  const cv::Mat& centres = cv::Mat());
 
 }  // namespace active_matching_slam

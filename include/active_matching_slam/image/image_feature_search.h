@@ -37,9 +37,11 @@ class ImageFeatureSearch : public FeatureSearch {
   /// shared, must not be written to during the frame; anything else is taken as an image without
   /// valid area.
   /// `sources`: what these were warped from, one each, for wide ellipses; empty: those are searched
-  /// pixel by pixel.
+  /// pixel by pixel. `centres`: of the image's size, CV_8U; where it is 0 nothing is searched (see
+  /// ImageMask::templateCentres()); empty: nothing is left out.
   void beginFrame(const cv::Mat& image, const std::vector<Template>& templates,
-                  const std::vector<TemplateSource>& sources = {});
+                  const std::vector<TemplateSource>& sources = {},
+                  const cv::Mat& centres = cv::Mat());
 
   int featureCount() const override { return feature_count_; }
   SearchOutcome search(int feature, const SearchEllipse& ellipse) override;
@@ -52,6 +54,8 @@ class ImageFeatureSearch : public FeatureSearch {
 
   /// Best scoring match of the feature so far; null when there is none.
   const SearchMatch* bestMatch(int feature) const;
+  /// Whether a search of the feature reached where no pixel is searched: it may lie there.
+  bool isPartlyMasked(int feature) const { return features_[feature].partly_masked; }
   /// Correlations made in this frame: distinct (feature, pixel) pairs.
   std::int64_t pixelsSearched() const { return pixels_searched_; }
   /// Pixels which, correlated one by one, would bring as many spurious matches of the feature as
@@ -80,6 +84,7 @@ class ImageFeatureSearch : public FeatureSearch {
     PixelMask covered;             ///< then: all that was searched either way
     double coarse_pixels = 0.0, coarse_clutter_pixels = 0.0;
     std::array<CoarseLevel, kCoarsestLevel> coarse;  ///< levels 1, 2 ...
+    bool partly_masked = false;
   };
   /// A position scored at least at the threshold that may be a local maximum.
   struct Candidate {
@@ -90,6 +95,26 @@ class ImageFeatureSearch : public FeatureSearch {
   void searchPixels(Feature& feature, const SearchEllipse& ellipse, const PixelBox& valid);
   void addRun(Feature& feature, const PixelRun& run);
   void addSearchedRun(Feature& feature, const PixelRun& run);
+  bool isCentre(int u, int v) const {
+    return centres_.empty() || centres_.at<std::uint8_t>(v, u) != 0;
+  }
+  /// Calls f for the parts of a run that may be searched; whether that is less than all of it.
+  template <typename F>
+  bool forEachUnmasked(const PixelRun& run, F f) const {
+    if (centres_.empty()) {
+      f(run);
+      return false;
+    }
+    int unmasked = 0;
+    for (int u = run.begin_u; u < run.end_u;) {
+      int end = u;
+      while (end < run.end_u && isCentre(end, run.v)) ++end;
+      if (end > u) f(PixelRun{run.v, u, end});
+      unmasked += end - u;
+      u = end + 1;
+    }
+    return unmasked < run.end_u - run.begin_u;
+  }
   void scoreAddedRuns(Feature& feature);
   void coverBox(Feature& feature, const PixelBox& box);
   void decideCandidate(Feature& feature, const Candidate& candidate, const PixelBox& valid);
@@ -107,7 +132,7 @@ class ImageFeatureSearch : public FeatureSearch {
 
   ImageOptions options_;
   Correlator correlator_;
-  cv::Mat image_;
+  cv::Mat image_, centres_;
   ImagePyramid pyramid_;
   std::vector<TemplateSource> sources_;
   int feature_count_ = 0;

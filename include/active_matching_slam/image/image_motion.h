@@ -18,8 +18,10 @@ struct ImageMotion {
 
 /// Aligns small, smoothed copies of two 8-bit grey images of one size (Klein and Murray 2008,
 /// section 4) by the enhanced correlation coefficient (Evangelidis and Psarakis 2008), from `guess`
-/// on. Empty when they have little in common, or when they fit in another place as well.
+/// on. Empty when they have little in common, or when they fit in another place as well. `used`
+/// (CV_8U, of their size; empty: all): 0 where neither shows the scene.
 std::optional<ImageMotion> estimateImageMotion(const cv::Mat& previous, const cv::Mat& image,
-                                               const ImageMotion& guess);
+                                               const ImageMotion& guess,
+                                               const cv::Mat& used = cv::Mat());
 
 }  // namespace active_matching_slam

@@ -8,6 +8,7 @@
 
 #include "active_matching_slam/camera/camera_model.h"
 #include "active_matching_slam/filter/ekf.h"
+#include "active_matching_slam/image/image_mask.h"
 #include "active_matching_slam/image/image_options.h"
 #include "active_matching_slam/map/feature_map.h"
 #include "active_matching_slam/map/relocaliser_options.h"
@@ -31,9 +32,17 @@ class Relocaliser {
   Relocaliser(const RelocaliserOptions& options, const MapOptions& map, const ImageOptions& image);
 
   /// `camera`: with its lens as known by now. `image`: 8-bit grey of the camera's size. Empty when
-  /// the place can't be told with certainty. The camera of `filter` plays no part.
+  /// the place can't be told with certainty. The camera of `filter` plays no part. `mask`: which
+  /// part of the image is used.
   std::optional<Relocalisation> find(const CameraModel& camera, const cv::Mat& image,
-                                     const Ekf& filter, const FeatureMap& map) const;
+                                     const Ekf& filter, const FeatureMap& map,
+                                     const ImageMask& mask = {}) const;
+
+  /// The same by `matches` in the place of descriptors. Some of them may be wrong.
+  std::optional<Relocalisation> findByMatches(const CameraModel& camera, const cv::Mat& image,
+                                              const Ekf& filter, const FeatureMap& map,
+                                              const std::vector<FeatureMeasurement>& matches,
+                                              const ImageMask& mask = {}) const;
 
   /// Whether enough features have a known depth; else find() would search for ever in vain.
   bool canFind(const Ekf& filter, const FeatureMap& map) const;
@@ -48,14 +57,19 @@ class Relocaliser {
     Eigen::Vector2d pixel;
   };
   std::vector<Landmark> usableLandmarks(const Ekf& filter, const FeatureMap& map) const;
+  std::optional<Relocalisation> prove(const CameraModel& camera, const cv::Mat& image,
+                                      const std::vector<Landmark>& landmarks,
+                                      Eigen::Isometry3d T_world_camera,
+                                      const ImageMask& mask) const;
   std::vector<Sighting> matchDescriptors(const cv::Mat& image,
-                                         const std::vector<Landmark>& landmarks) const;
+                                         const std::vector<Landmark>& landmarks,
+                                         const ImageMask& mask) const;
   std::optional<Eigen::Isometry3d> solvePose(const CameraModel& camera,
                                              const std::vector<Sighting>& sightings) const;
   /// Searches all that should be seen within `radius_px`; returns how many that are.
   int searchVisible(const CameraModel& camera, const cv::Mat& image,
                     const std::vector<Landmark>& landmarks, const Eigen::Isometry3d& T_world_camera,
-                    double radius_px, std::vector<Sighting>* found) const;
+                    double radius_px, const ImageMask& mask, std::vector<Sighting>* found) const;
   Eigen::Isometry3d refinePose(const CameraModel& camera, const std::vector<Sighting>& sightings,
                                Eigen::Isometry3d T_world_camera) const;
   /// Distance of a sighting from where the pose predicts it; infinite when it predicts none.

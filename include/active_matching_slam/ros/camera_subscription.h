@@ -12,6 +12,8 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "active_matching_slam/ros/repeated_warning.h"
+
 namespace active_matching_slam {
 
 /// An image as it arrived, with the newest calibration known at that moment.
@@ -19,6 +21,8 @@ struct CameraImage {
   sensor_msgs::ImageConstPtr raw;  ///< one of these two
   sensor_msgs::CompressedImageConstPtr compressed;
   sensor_msgs::CameraInfoConstPtr info;  ///< null: none yet
+  bool rectified = false;                ///< the image is, by what info.P says
+  sensor_msgs::ImageConstPtr mask;       ///< null: as before
   ros::WallTime received;
 
   const std_msgs::Header& header() const { return raw ? raw->header : compressed->header; }
@@ -37,7 +41,7 @@ class CameraSubscription {
  public:
   using Callback = std::function<void(const CameraImage&)>;
 
-  /// Throws std::invalid_argument for a `camera_info_url` that can't be read.
+  /// Throws std::invalid_argument or std::runtime_error for a `camera_info_url` that can't be read.
   CameraSubscription(const ros::NodeHandle& private_node, const std::string& camera_info_url,
                      double silence_timeout_s);
 
@@ -57,20 +61,26 @@ class CameraSubscription {
   void deliver(CameraImage image);
   void onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info);
   void watch(const ros::WallTimerEvent&);
+  void subscribeCompressed(const std::string& topic);
+  std::string whatIsThere();
   std::uint32_t publishers() const;
 
   ros::NodeHandle node_;
   Callback callback_;
   std::atomic<double> silence_timeout_s_;
-  std::string image_topic_, info_topic_;
+  std::string base_topic_;  ///< without that of the transport
+  std::string image_topic_, info_topic_, transport_;
   image_transport::ImageTransport image_transport_;
   image_transport::Subscriber image_subscriber_;
   ros::Subscriber compressed_subscriber_, info_subscriber_;
   ros::WallTimer watch_timer_;
+  ros::WallTime last_look_;  ///< at what is there
+  RepeatedWarning several_warning_;
   std::atomic<std::uint64_t> received_{0};
   mutable std::mutex mutex_;  // guards what follows
   sensor_msgs::CameraInfoConstPtr info_;
   ros::WallTime first_image_, last_image_, last_warning_;
+  std::string there_;  ///< found when nobody publishes images on the topic
 };
 
 }  // namespace active_matching_slam

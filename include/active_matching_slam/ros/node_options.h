@@ -12,6 +12,8 @@ struct NodeOptions {
   std::string image_transport = "raw";
   std::string camera_info_url;
   std::string known_target;
+  std::string mask_file;
+  std::string first_map;
   std::string data_directory;
   std::string tf_mode = "camera";
   std::string world_frame = "world";
@@ -44,6 +46,14 @@ void NodeOptions::visitFields(Self& o, Visitor&& visit) {
                     "yaml file with points of known position to start from; empty: scale free")
             .atStartOnly(),
         o.known_target);
+  visit(basicOption("mask_file", "",
+                    "picture of the images' size: only where it is white images are used (~mask "
+                    "takes its place)")
+            .atStartOnly(),
+        o.mask_file);
+  visit(basicOption("first_map", "", "map to begin with, a file in data_directory; empty: none")
+            .atStartOnly(),
+        o.first_map);
   visit(basicOption("data_directory", "",
                     "where maps and trajectories live; empty: ~/.ros/active_matching_slam")
             .atStartOnly(),

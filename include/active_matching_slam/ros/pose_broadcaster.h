@@ -1,6 +1,7 @@
 #pragma once
 
 #include <ros/ros.h>
+#include <tf2_msgs/TFMessage.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
@@ -8,10 +9,12 @@
 
 #include <Eigen/Geometry>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
 #include "active_matching_slam/ros/node_options.h"
+#include "active_matching_slam/ros/pose_conversions.h"
 #include "active_matching_slam/ros/repeated_warning.h"
 #include "active_matching_slam/tracker/tracked_frame.h"
 
@@ -38,6 +41,12 @@ class PoseBroadcaster {
   std::optional<Eigen::Isometry3d> cameraFromBase(const std::string& camera_frame,
                                                   const ros::Time& stamp);
 
+  /// The camera in the world, of a pose in `frame_id`: in world_frame the camera's own, as ~pose
+  /// is; in map_frame (z up) that of a body that looks along x, as rviz sends it; with base_frame
+  /// that frame's, in either. Throws std::invalid_argument for other frames.
+  UncertainPose cameraOf(const UncertainPose& given, const std::string& frame_id,
+                         const std::string& camera_frame);
+
   /// Sends the transforms of a frame whose state is kTracking. `T_camera_base` as above.
   void send(const TrackedFrame& frame, const std::string& camera_frame, const ros::Time& stamp,
             const Eigen::Isometry3d& T_camera_base);
@@ -47,6 +56,7 @@ class PoseBroadcaster {
                                           const ros::Time& stamp);
   void sendMapToOdom(const TrackedFrame& frame, const std::string& camera_frame,
                      const ros::Time& stamp);
+  void onTransforms(const tf2_msgs::TFMessage& message);
   void sendStatic(const Eigen::Isometry3d& T_map_world, const ros::Time& stamp);
 
   NodeOptions options_;
@@ -56,6 +66,10 @@ class PoseBroadcaster {
   std::unique_ptr<tf2_ros::TransformListener> listener_;  ///< null when nothing is looked up
   std::optional<Eigen::Isometry3d> T_map_world_;
   RepeatedWarning warning_;
+  ros::Subscriber transforms_, static_transforms_;  ///< of others
+  std::mutex mutex_;                                ///< guards what follows
+  std::string child_frame_;                         ///< to which transforms are sent
+  RepeatedWarning parents_warning_;
 };
 
 }  // namespace active_matching_slam

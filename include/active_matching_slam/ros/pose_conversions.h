@@ -57,6 +57,22 @@ geometry_msgs::PoseWithCovarianceStamped toPoseWithCovarianceMsg(const RigidBody
 nav_msgs::Odometry toOdometryMsg(const RigidBodyState& state, const std_msgs::Header& header,
                                  const std::string& child_frame);
 
+/// A pose that is known with some uncertainty: of x y z, then rotations about the parent's fixed
+/// axes [m^2, rad^2].
+struct UncertainPose {
+  Eigen::Isometry3d T_parent_child;
+  Matrix6d covariance;
+};
+
+/// A variance of 0 stands for one that was left out, as rviz leaves out height, roll and pitch: it
+/// takes the largest of its kind. Throws std::invalid_argument for numbers that are no pose, or a
+/// covariance that is zero.
+UncertainPose fromPoseWithCovarianceMsg(const geometry_msgs::PoseWithCovariance& message);
+
+/// The same of another child in another parent, both fixed to those before. First order.
+UncertainPose transformed(const UncertainPose& pose, const Eigen::Isometry3d& T_new_parent,
+                          const Eigen::Isometry3d& T_child_new);
+
 /// Optical axes (x right, y down, z forward) to body axes (x forward, y left, z up), REP 103: the
 /// rotation that takes a vector's optical coordinates to its body coordinates.
 Eigen::Quaterniond bodyFromOptical();

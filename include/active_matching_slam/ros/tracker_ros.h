@@ -1,5 +1,6 @@
 #pragma once
 
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <ros/ros.h>
 #include <std_srvs/Trigger.h>
 
@@ -11,6 +12,7 @@
 #include "active_matching_slam/ros/data_directory.h"
 #include "active_matching_slam/ros/frame_publisher.h"
 #include "active_matching_slam/ros/frame_worker.h"
+#include "active_matching_slam/ros/masked_images.h"
 #include "active_matching_slam/ros/messages.h"
 #include "active_matching_slam/ros/node_diagnostics.h"
 #include "active_matching_slam/ros/node_options.h"
@@ -32,7 +34,8 @@ NodeSettings readNodeSettings(const ros::NodeHandle& private_node);
 
 /// The tracker as a member of a ROS graph: what node and nodelet share.
 ///
-/// Subscribes to `image` (image_transport) and the camera_info beside it; publishes what
+/// Subscribes to `image` (image_transport) and the camera_info beside it, `initialpose` and ~mask;
+/// publishes what
 /// FramePublisher, PoseBroadcaster, NodeDiagnostics and ReconfigureServer say; serves ~reset,
 /// ~save_map, ~load_map, ~save_trajectory, ~set_scale, ~set_matcher. Parameters: option_field.h
 /// and node_options.h.
@@ -55,6 +58,9 @@ class TrackerRos {
 
   // In the thread that serves callbacks.
   void advertiseServices();
+  void subscribeBeside();
+  void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message);
+  void setPose(const geometry_msgs::PoseWithCovarianceStamped& message);
   std::string applyChanges(const std::vector<ReconfigureServer::Change>& changes);
   /// Runs `task` in the worker; success and message are what the service answers.
   template <class Response>
@@ -78,6 +84,8 @@ class TrackerRos {
   PoseBroadcaster broadcaster_;
   TrajectoryLog trajectory_;
   TrackingState state_ = TrackingState::kWaiting;
+  std::shared_ptr<const TrackedFrame> last_frame_;
+  std::string camera_frame_ = "camera";  ///< of the last image
   int generation_ = 0, resets_ = 0;
   int map_ = 0;
   double last_stamp_s_ = 0.0;
@@ -85,7 +93,9 @@ class TrackerRos {
   std::string reset_cause_;  ///< asked for by a service: not worth a warning
 
   std::unique_ptr<FrameWorker<CameraImage>> worker_;
+  std::unique_ptr<MaskedImages> masked_images_;
   std::unique_ptr<CameraSubscription> subscription_;
+  ros::Subscriber mask_, initial_pose_;
   std::unique_ptr<ReconfigureServer> reconfigure_;
   std::vector<ros::ServiceServer> services_;
 };

@@ -6,6 +6,7 @@
 
 #include "active_matching_slam/camera/camera_calibration.h"
 #include "active_matching_slam/ros/camera_subscription.h"
+#include "active_matching_slam/ros/one_camera.h"
 #include "active_matching_slam/ros/repeated_warning.h"
 #include "active_matching_slam/tracker/tracker.h"
 
@@ -20,10 +21,18 @@ class TrackingSession {
   /// Throws std::invalid_argument, see checkTrackerOptions().
   explicit TrackingSession(const TrackerOptions& options);
 
+  /// Which part of all images is used, until a mask comes with them; see Tracker::setMask().
+  /// Without effect on a tracker that exists.
+  void setMask(const cv::Mat& used) { first_mask_ = used; }
+  /// A map file that the first tracker begins with.
+  void setFirstMap(const std::string& path) { first_map_ = path; }
+
   /// Null when the image can't be given to a tracker; fault() then says why.
   std::shared_ptr<const TrackedFrame> process(const CameraImage& image);
   /// What was wrong with the last image (calibration, encoding, stamp, size); empty: nothing.
   const std::string& fault() const { return fault_; }
+  /// What is wrong with the last mask that came with an image: it is not used. Empty: nothing.
+  const std::string& maskFault() const { return mask_fault_; }
 
   /// Null while there is no usable calibration.
   Tracker* tracker() { return tracker_.get(); }
@@ -43,6 +52,7 @@ class TrackingSession {
  private:
   bool updateCamera(const CameraImage& image);
   void takeCalibration(const CameraCalibration& calibration);
+  void updateMask(const sensor_msgs::ImageConstPtr& mask);
   TrackerOptions demandedOptions() const;
 
   TrackerOptions options_;
@@ -53,6 +63,10 @@ class TrackingSession {
   std::unique_ptr<Tracker> tracker_;
   int generation_ = 0;
   std::string fault_;
+  OneCamera cameras_;
+  cv::Mat first_mask_;
+  sensor_msgs::ImageConstPtr mask_;
+  std::string mask_fault_, first_map_;
   RepeatedWarning warning_;
 };
 

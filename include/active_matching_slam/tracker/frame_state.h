@@ -7,6 +7,7 @@
 
 #include "active_matching_slam/filter/ekf.h"
 #include "active_matching_slam/image/image_feature_search.h"
+#include "active_matching_slam/image/image_mask.h"
 #include "active_matching_slam/image/template.h"
 #include "active_matching_slam/map/feature_map.h"
 #include "active_matching_slam/matching/match_result.h"
@@ -20,7 +21,8 @@ struct FrameState {
   explicit FrameState(const ImageOptions& options) : search(options) {}
 
   // From the prediction.
-  cv::Mat image;
+  cv::Mat image;                        ///< with what is not used in plain grey
+  ImageMask mask;                       ///< which part of it is used
   double interval_s = 0.0;              ///< since the filter's state before
   double predicted_interval_s = 0.0;    ///< of that, what the motion was predicted over
   int poor_frames = 0;                  ///< frames just before this one with too few matches

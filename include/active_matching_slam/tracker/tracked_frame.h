@@ -29,10 +29,12 @@ std::string scaleSourceName(ScaleSource source);
 
 /// What became of a feature in this frame.
 enum class FeatureStatus {
-  kNotVisible,   ///< outside the image, behind, or too different a view of it than the first
-  kNotSearched,  ///< predicted visible but not chosen, or the budget ended first
-  kMissed,       ///< searched, no match met
-  kRejected,     ///< a match was met but not accepted
+  kNotVisible,  ///< outside the image, masked, behind, or too different a view of it than the first
+  /// Predicted visible but not chosen, or the budget ended first, or no match met where not all of
+  /// its gate could be searched, for the mask.
+  kNotSearched,
+  kMissed,    ///< searched, no match met
+  kRejected,  ///< a match was met but not accepted
   kMatched
 };
 std::string featureStatusName(FeatureStatus status);
@@ -98,7 +100,8 @@ struct TrackedFrame {
   /// Whether the poses can be trusted, 0 to 1, and the likely cause where they can't.
   double quality = 1.0;
   std::string quality_reason;
-  int jumps = 0;  ///< so often since construction the pose did not go on from the one before
+  int jumps = 0;        ///< so often since construction the pose did not go on from the one before
+  int late_images = 0;  ///< left out since construction: taken before one that came earlier
 
   std::shared_ptr<const MutualInformationGraph> graph;  ///< null unless asked for
   std::shared_ptr<const SubmapHierarchy> submaps;       ///< null unless asked for
@@ -106,6 +109,7 @@ struct TrackedFrame {
   /// 8-bit grey, as tracked (shared, not to be written to): of the working size, see
   /// ImageOptions::working_width. All pixels are of this image.
   cv::Mat image;
+  cv::Mat mask;  ///< 0 where the image was not used; empty: all of it was
   FrameTimings timings_ms;
 };
 

@@ -19,11 +19,16 @@ class Tracker {
 
   /// `image`: 8-bit grey of the camera's size. `stamp_s`: acquisition time. Bad input (wrong size
   /// or type, empty, a stamp that is not later than the last, not finite) never throws: nothing is
-  /// changed and the frame's `reason` says what was wrong; a stamp that runs back resets the
-  /// tracker.
-  std::shared_ptr<const TrackedFrame> track(const cv::Mat& image, double stamp_s);
+  /// changed and the frame's `reason` says what was wrong; a stamp that runs back by more than a
+  /// second resets the tracker. `fault`: why there is no image, when it is empty.
+  std::shared_ptr<const TrackedFrame> track(const cv::Mat& image, double stamp_s,
+                                            const std::string& fault = "");
 
-  /// Empties the map; the next image starts anew.
+  /// Which part of the images from the next one on shows the scene: 8-bit grey of the camera's
+  /// size, white is used. Empty: all. Throws std::invalid_argument naming what is wrong with it.
+  void setMask(const cv::Mat& used);
+
+  /// Empties the map, and the next image starts anew; without mapping looks for the camera anew.
   void reset(const std::string& reason);
 
   const TrackerOptions& options() const;
@@ -38,6 +43,13 @@ class Tracker {
   /// Replaces the map and looks for the camera in it; on any fault throws std::runtime_error and
   /// changes nothing.
   void loadMap(const std::string& path);
+
+  /// The camera is somewhere near `T_world_camera`: it is looked for there. `covariance` of
+  /// position and rotation in CameraError order. Until it is found no pose is claimed. Throws
+  /// std::runtime_error without a map, std::invalid_argument for numbers that are no pose or no
+  /// covariance.
+  void setPose(const Eigen::Isometry3d& T_world_camera,
+               const Eigen::Matrix<double, 6, 6>& covariance);
 
  private:
   class Implementation;

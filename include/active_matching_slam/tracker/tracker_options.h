@@ -40,6 +40,7 @@ inline MatchOptions liveMatchOptions() {
 /// All settings of a Tracker.
 struct TrackerOptions {
   std::string matcher = "auto";
+  bool mapping = true;  ///< false: the camera is found and followed in a map that stays as loaded
   FilterOptions filter;
   ImageOptions image;
   MapOptions map;
@@ -47,17 +48,17 @@ struct TrackerOptions {
   MatchCascadeOptions cascade;
   InitialiserOptions initialisation;
   RelocaliserOptions relocaliser;
-  std::vector<KnownPoint> known_points;  ///< empty: scale free, world = first camera frame
-  double known_points_search_px = 15.0;  ///< how far each may lie from its image_px
-  double known_points_sigma_m = 5e-4;    ///< of their positions, per axis
-  double max_frame_interval_s = 0.5;     ///< after a longer gap the whole image is searched first
-  int lost_after_frames = 15;            ///< consecutive frames with too few matches
-  int minimum_matches = 4;               ///< fewer is 'too few'
+  std::vector<KnownPoint> known_points;    ///< empty: scale free, world = first camera frame
+  double known_points_search_px = 15.0;    ///< how far each may lie from its image_px
+  double known_points_sigma_m = 5e-4;      ///< of their positions, per axis
+  double max_frame_interval_s = 0.5;       ///< after a longer gap the whole image is searched first
+  int lost_after_frames = 15;              ///< consecutive frames with too few matches
+  int minimum_matches = 4;                 ///< fewer is 'too few'
   double new_map_when_lost_after_s = 1.0;  ///< the old one is kept and looked for; 0: never
-  double reset_when_lost_after_s = 0.0;  ///< give up the map that was lost; 0: never
-  bool learn_rates = true;               ///< of each feature's true and false matches
-  bool fallback_matchers = true;         ///< where few match, see MatchCascade
-  bool structure = false;                ///< maintain the MI graph and the submaps
+  double reset_when_lost_after_s = 0.0;    ///< give up the map that was lost; 0: never
+  bool learn_rates = true;                 ///< of each feature's true and false matches
+  bool fallback_matchers = true;           ///< where few match, see MatchCascade
+  bool structure = false;                  ///< maintain the MI graph and the submaps
   /// What the graph's mutual information expects of the camera from one image to the next. (Search
   /// regions allow for jerks too, and a jerk turns: that moves near and far alike, and hides the
   /// differences between them.)
@@ -73,6 +74,9 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
   visit(basicOption("matcher", "",
                     "active_search, jcbb, one_point_ransac, active, fast_active, chow_liu or auto"),
         o.matcher);
+  visit(basicOption("mapping", "", "false: follow the camera in a loaded map, which stays as it is")
+            .atStartOnly(),
+        o.mapping);
   visit(basicOption("fallback_matchers", "",
                     "when far fewer match than should, match again by the motion of the whole "
                     "image, jcbb, one_point_ransac"),

@@ -20,9 +20,23 @@ bool endsWith(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-std::set<std::string> imageTopics(const rosbag::Bag& bag) {
+std::string namesOf(const Bags& bags) {
+  std::string names;
+  for (const auto& bag : bags) names += (names.empty() ? "" : ", ") + bag->getFileName();
+  return names;
+}
+
+/// Messages of a topic, in the order of recording.
+std::unique_ptr<rosbag::View> viewOf(const Bags& bags, const std::string& topic) {
+  auto view = std::make_unique<rosbag::View>();
+  for (const auto& bag : bags) view->addQuery(*bag, rosbag::TopicQuery(topic));
+  return view;
+}
+
+std::set<std::string> imageTopics(const Bags& bags) {
   std::set<std::string> topics;
-  rosbag::View view(bag);
+  rosbag::View view;
+  for (const auto& bag : bags) view.addQuery(*bag);
   for (const rosbag::ConnectionInfo* connection : view.getConnections())
     if (connection->datatype == "sensor_msgs/Image" ||
         connection->datatype == "sensor_msgs/CompressedImage")
@@ -30,14 +44,14 @@ std::set<std::string> imageTopics(const rosbag::Bag& bag) {
   return topics;
 }
 
-std::string findImageTopic(const rosbag::Bag& bag, const std::string& wanted) {
-  const std::set<std::string> topics = imageTopics(bag);
+std::string findImageTopic(const Bags& bags, const std::string& wanted) {
+  const std::set<std::string> topics = imageTopics(bags);
   for (const std::string& topic : {wanted, wanted + kCompressed})
     if (topics.count(topic)) return topic;
   std::string list;
   for (const std::string& topic : topics) list += (list.empty() ? "" : ", ") + topic;
   throw std::runtime_error(
-      bag.getFileName() + ": no images on " + wanted + "; " +
+      namesOf(bags) + ": no images on " + wanted + "; " +
       (list.empty() ? "the bag has no image topic" : "image topics there: " + list));
 }
 
@@ -47,15 +61,13 @@ double stampOf(const std_msgs::Header& header, const ros::Time& recorded) {
 
 /// Runs `read`; what rosbag throws about a damaged file then names the file.
 template <typename F>
-auto reading(const rosbag::Bag& bag, F read) -> decltype(read()) {
+auto reading(const Bags& bags, F read) -> decltype(read()) {
   try {
     return read();
   } catch (const ros::Exception& error) {  // rosbag's and ros::serialization's
-    throw std::runtime_error(bag.getFileName() + ": damaged: " + error.what());
+    throw std::runtime_error(namesOf(bags) + ": damaged: " + error.what());
   }
 }
-
-}  // namespace
 
 std::unique_ptr<rosbag::Bag> openBag(const std::string& path) {
   if (!std::ifstream(path)) throw std::runtime_error(path + ": cannot be opened");
@@ -71,17 +83,26 @@ std::unique_ptr<rosbag::Bag> openBag(const std::string& path) {
   return bag;
 }
 
-BagImageSource::BagImageSource(const rosbag::Bag& bag, const std::string& topic) : bag_(bag) {
-  reading(bag_, [&] {
-    topic_ = findImageTopic(bag, topic);
-    view_ = std::make_unique<rosbag::View>(bag, rosbag::TopicQuery(topic_));
+}  // namespace
+
+Bags openBags(const std::vector<std::string>& paths) {
+  Bags bags;
+  for (const std::string& path : paths) bags.push_back(openBag(path));
+  return bags;
+}
+
+BagImageSource::BagImageSource(const Bags& bags, const std::string& topic) : bags_(bags) {
+  reading(bags_, [&] {
+    topic_ = findImageTopic(bags, topic);
+    view_ = viewOf(bags, topic_);
     position_ = view_->begin();
   });
 }
 
 bool BagImageSource::next(cv::Mat* image, double* stamp_s) {
-  return reading(bag_, [&] {
+  return reading(bags_, [&] {
     if (position_ == view_->end()) return false;
+    fault_.clear();
     const rosbag::MessageInstance& message = *position_;
     image->release();
     std_msgs::Header header;
@@ -95,7 +116,13 @@ bool BagImageSource::next(cv::Mat* image, double* stamp_s) {
       }
     } catch (const ros::Exception&) {  // the bag
       throw;
-    } catch (const std::runtime_error&) {  // this image only
+    } catch (const std::runtime_error& error) {  // this image only
+      fault_ = error.what();
+    }
+    const std::string other = cameras_.faultOf(header, message.getCallerId());
+    if (!other.empty()) {
+      fault_ = other;
+      image->release();
     }
     *stamp_s = stampOf(header, message.getTime());
     ++position_;
@@ -104,7 +131,7 @@ bool BagImageSource::next(cv::Mat* image, double* stamp_s) {
 }
 
 bool BagImageSource::skip() {
-  return reading(bag_, [&] {
+  return reading(bags_, [&] {
     if (position_ == view_->end()) return false;
     ++position_;
     return true;
@@ -118,27 +145,34 @@ std::string cameraInfoTopicOf(const std::string& image_topic) {
   return (slash == std::string::npos ? "" : topic.substr(0, slash + 1)) + "camera_info";
 }
 
-CameraCalibration readBagCalibration(const rosbag::Bag& bag, const std::string& topic) {
-  return reading(bag, [&] {
-    rosbag::View view(bag, rosbag::TopicQuery(topic));
-    for (const rosbag::MessageInstance& message : view) {
+CameraCalibration readBagCalibration(const Bags& bags, const std::string& topic, bool rectified,
+                                     std::vector<std::string>* doubts) {
+  return reading(bags, [&] {
+    const auto view = viewOf(bags, topic);
+    std::string fault = "no sensor_msgs/CameraInfo on " + topic;
+    for (const rosbag::MessageInstance& message : *view) {
       const auto info = message.instantiate<sensor_msgs::CameraInfo>();
       if (!info) break;
       try {
-        return toCalibration(*info);
+        const CameraCalibration calibration = toCalibration(*info, rectified);
+        *doubts = calibrationDoubts(*info, calibration);
+        return calibration;
       } catch (const std::invalid_argument& error) {
-        throw std::runtime_error(bag.getFileName() + ": " + topic + ": " + error.what());
+        fault = topic + ": " + error.what();
+        const bool comes_later = info->K[0] == 0.0;  // of a driver that has not read it yet
+        if (!comes_later) break;
       }
     }
-    throw std::runtime_error(bag.getFileName() + ": no sensor_msgs/CameraInfo on " + topic);
+    throw std::runtime_error(namesOf(bags) + ": " + fault +
+                             " (--camera-info reads a calibration from a file)");
   });
 }
 
-Trajectory readBagTrajectory(const rosbag::Bag& bag, const std::string& topic) {
-  return reading(bag, [&] {
+Trajectory readBagTrajectory(const Bags& bags, const std::string& topic) {
+  return reading(bags, [&] {
     Trajectory trajectory;
-    rosbag::View view(bag, rosbag::TopicQuery(topic));
-    for (const rosbag::MessageInstance& message : view) {
+    const auto view = viewOf(bags, topic);
+    for (const rosbag::MessageInstance& message : *view) {
       const auto pose = message.instantiate<geometry_msgs::PoseStamped>();
       if (!pose) break;
       StampedPose stamped;
@@ -154,8 +188,8 @@ Trajectory readBagTrajectory(const rosbag::Bag& bag, const std::string& topic) {
   });
 }
 
-bool bagHasTopic(const rosbag::Bag& bag, const std::string& topic) {
-  return reading(bag, [&] { return rosbag::View(bag, rosbag::TopicQuery(topic)).size() > 0; });
+bool bagHasTopic(const Bags& bags, const std::string& topic) {
+  return reading(bags, [&] { return viewOf(bags, topic)->size() > 0; });
 }
 
 }  // namespace active_matching_slam

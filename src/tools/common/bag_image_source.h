@@ -6,37 +6,46 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
+#include <vector>
 
 #include "active_matching_slam/camera/camera_calibration.h"
 #include "active_matching_slam/evaluation/run_sequence.h"
 #include "active_matching_slam/evaluation/trajectory.h"
+#include "active_matching_slam/ros/one_camera.h"
 
 namespace active_matching_slam {
 
-/// Opens a bag for reading. Throws std::runtime_error naming the file and what is wrong with it:
-/// missing, no bag, without its index (cut off while recording or copying).
-std::unique_ptr<rosbag::Bag> openBag(const std::string& path);
+/// One recording, which may be cut into several bags.
+using Bags = std::vector<std::unique_ptr<rosbag::Bag>>;
 
-/// The grey images of one topic of a bag (sensor_msgs/Image or CompressedImage), in the order of
-/// recording, stamped by their headers (or by the time of recording when a header has no stamp).
+/// Opens bags for reading. Throws std::runtime_error naming the file and what is wrong with it:
+/// missing, no bag, without its index (cut off while recording or copying).
+Bags openBags(const std::vector<std::string>& paths);
+
+/// The grey images of one topic (sensor_msgs/Image or CompressedImage), in the order of recording
+/// over all bags, stamped by their headers (or by the time of recording when a header has no
+/// stamp).
 class BagImageSource : public ImageSource {
  public:
-  /// `bag` outlives the source. `topic` is also found as `topic`/compressed. Throws
+  /// `bags` outlive the source. `topic` is also found as `topic`/compressed. Throws
   /// std::runtime_error that lists the image topics of the bag when there is no such topic, or no
   /// image on it.
-  BagImageSource(const rosbag::Bag& bag, const std::string& topic);
+  BagImageSource(const Bags& bags, const std::string& topic);
 
   const std::string& topic() const { return topic_; }
   int size() { return static_cast<int>(view_->size()); }
 
-  /// An image that can't be decoded is delivered empty: the tracker says so in its frame. Throws
+  /// An image that can't be decoded, or is of another camera on the same topic, is delivered empty;
+  /// fault() says why. Throws
   /// std::runtime_error when the bag itself can't be read on.
   bool next(cv::Mat* image, double* stamp_s) override;
+  std::string fault() const override { return fault_; }
   bool skip() override;
 
  private:
-  const rosbag::Bag& bag_;
-  std::string topic_;
+  const Bags& bags_;
+  OneCamera cameras_;
+  std::string topic_, fault_;
   std::unique_ptr<rosbag::View> view_;
   rosbag::View::iterator position_;
 };
@@ -45,12 +54,14 @@ class BagImageSource : public ImageSource {
 /// /camera/image_raw/compressed both lead to /camera/camera_info.
 std::string cameraInfoTopicOf(const std::string& image_topic);
 
-/// First camera_info on the topic. Throws std::runtime_error when there is none, or it is at fault.
-CameraCalibration readBagCalibration(const rosbag::Bag& bag, const std::string& topic);
+/// First camera_info on the topic that is calibrated, and what makes one doubt it. `rectified`: of
+/// rectified images. Throws std::runtime_error when there is none, or it is at fault.
+CameraCalibration readBagCalibration(const Bags& bags, const std::string& topic, bool rectified,
+                                     std::vector<std::string>* doubts);
 
-/// True poses on a topic of geometry_msgs/PoseStamped; empty when the bag has no such topic.
-Trajectory readBagTrajectory(const rosbag::Bag& bag, const std::string& topic);
+/// True poses on a topic of geometry_msgs/PoseStamped; empty when there is no such topic.
+Trajectory readBagTrajectory(const Bags& bags, const std::string& topic);
 
-bool bagHasTopic(const rosbag::Bag& bag, const std::string& topic);
+bool bagHasTopic(const Bags& bags, const std::string& topic);
 
 }  // namespace active_matching_slam
