@@ -224,8 +224,9 @@ std::optional<SourcePatch> retakeSourcePatch(const SourcePatch& patch, const Cam
   const double facing = normal.dot(*bearing);
   if (!(facing > 0.0)) return std::nullopt;
   retaken->slope_per_px = d_bearing_d_pixel.transpose() * normal / facing;
-  retaken->slope_information_px2 =
+  const Eigen::Matrix2d information =
       view->affine * patch.slope_information_px2 * view->affine.transpose();
+  retaken->slope_information_px2 = 0.5 * (information + information.transpose());
   return retaken;
 }
 

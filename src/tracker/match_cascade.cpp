@@ -37,7 +37,10 @@ double expectedMatches(const FrameState& frame) {
 std::optional<MeasurementPrior> guidedPrior(const FrameState& frame,
                                             const MeasurementPrior& prior) {
   if (frame.reference_image.size() != frame.image.size()) return std::nullopt;
-  const auto flow_px = trackPoints(frame.reference_image, frame.image, frame.reference_px);
+  auto reference_px = frame.reference_px;
+  for (std::size_t i = 0; i < reference_px.size(); ++i)
+    if (!frame.in_reference[i]) reference_px[i].reset();
+  const auto flow_px = trackPoints(frame.reference_image, frame.image, reference_px);
   if (auto guided = conditionOnFlow(prior, flow_px, flowSigma_px(frame.image.cols))) return guided;
   const auto motion =
       estimateImageMotion(frame.reference_image, frame.image,

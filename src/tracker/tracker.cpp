@@ -209,7 +209,10 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
       current.emplace(follow(used, interval_s, frame.get()));
   }
   previous_image_ = mask_.isWhole() ? image.clone() : used;  // the caller may reuse its memory
-  if (poor_frames_ == 0) reference_image_ = previous_image_;
+  if (poor_frames_ == 0) {
+    reference_image_ = previous_image_;
+    reference_index_ = frame->index;
+  }
   if (lookForOtherMaps(used, frame.get())) current.reset();
   frame->state = state_;
   if (!reason_.empty()) frame->reason = reason_;

@@ -146,6 +146,7 @@ class Tracker::Implementation {
   cv::Mat previous_image_;
   /// The last image with enough matches, and its camera.
   cv::Mat reference_image_;
+  std::int64_t reference_index_ = -1;  ///< of that image
   Eigen::Isometry3d T_world_reference_ = Eigen::Isometry3d::Identity();
   double last_stamp_s_ = 0.0;   ///< of the last image accepted
   double state_stamp_s_ = 0.0;  ///< of the filter's state

@@ -100,6 +100,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
     const MapFeature& feature = *map_.find(id);
     current.sources.push_back({feature.patch, current.candidates[i].view});
     current.match_probabilities.push_back(feature.recent_rate);
+    current.in_reference.push_back(feature.last_matched_frame == reference_index_);
     if (options_.learn_rates)
       current.prior.rates.push_back(feature.rates.rates({options_.matching.default_rates}));
     const Eigen::Vector4d point = homogeneousPosition(*filter_.find(id));

@@ -50,6 +50,7 @@ FrameState makeFrame(const cv::Mat& first, const cv::Mat& image, double sigma_px
     frame.candidates.emplace_back();
     frame.match_probabilities.push_back(0.9);
     frame.reference_px.emplace_back(pixel);
+    frame.in_reference.push_back(1);
     frame.prior.ids.push_back(i);
     frame.prior.z.segment<2>(2 * i) = pixel;
     J.middleRows<2>(2 * i) << sigma_px, 0.0, 0.005 * (240.0 - pixel.y()), 0.0, sigma_px,
@@ -135,6 +136,20 @@ TEST(MatchCascade, BudgetGrowsWithTheIntervalAndHoldsForAllAttempts) {
   // The search that uses the budget up ends: one gate of 3 sigma more for each of the attempts.
   const double gate_px = M_PI * 24.0 * 24.0;
   EXPECT_LT(frame.matching.statistics.pixels_searched, 2000 + 4 * gate_px);
+}
+
+TEST(MatchCascade, ABusyMachineLeavesEnoughSearchesForAPose) {
+  const cv::Mat first = texture(1);
+  for (const char* matcher : {"active", "fast_active", "chow_liu", "jcbb", "active_search"}) {
+    MatchOptions options;
+    options.max_milliseconds = 5.0;
+    double now_s = 0.0;
+    options.clock_s = [&now_s] { return now_s += 0.02; };  // gone at the first look
+    FrameState frame = makeFrame(first, shifted(first, {3, -2}), 4.0);
+    MatchCascade(matcher).match(options, true, &frame);
+    EXPECT_TRUE(frame.matching.statistics.cut_short) << matcher;
+    EXPECT_GE(correctInliers(frame, {3.0, -2.0}), 8) << matcher;
+  }
 }
 
 TEST(MatchCascade, UnknownMatcherIsRefused) {

@@ -36,6 +36,7 @@ struct FrameState {
   std::vector<double> match_probabilities;  ///< by the feature's recent record
   /// Where it was in `reference_image`; empty where it was not in view.
   std::vector<std::optional<Eigen::Vector2d>> reference_px;
+  std::vector<char> in_reference;  ///< whether it was matched there: what is hidden has no flow
   MeasurementPrior prior;
   /// 2F x any: what a jerk, an acceleration as wide as the options expect, adds to the prior's S is
   /// this times its transpose.
