@@ -37,11 +37,10 @@ class Localisation : public testing::Test {
     std::ifstream file(path_, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
   }
-  static Tracker follower() {
-    Tracker tracker = slowTracker(withoutMapping());
-    tracker.loadMap(path_);
-    return tracker;
-  }
+  /// With the map loaded.
+  struct Follower : Tracker {
+    Follower() : Tracker(slowFilm().camera, withoutMapping()) { loadMap(path_); }
+  };
   static int firstFound(const Frames& frames) {
     int first = 0;
     for (const auto& frame : frames) {
@@ -59,7 +58,7 @@ Frames Localisation::mapped_;
 TEST_F(Localisation, FindsAndFollowsTheCameraInTheMap) {
   const Film& film = slowFilm();
   const std::string file = contentOfMap();
-  Tracker tracker = follower();
+  Follower tracker;
   const Frames frames = trackFrames(film, &tracker, kMapped, 180);
   const int found = firstFound(frames);
   ASSERT_LT(found, 10);
@@ -78,7 +77,7 @@ TEST_F(Localisation, FindsAndFollowsTheCameraInTheMap) {
 }
 
 TEST_F(Localisation, TheMapStaysAsItWasLoadedToTheBit) {
-  Tracker tracker = follower();
+  Follower tracker;
   const Frames frames = trackFrames(slowFilm(), &tracker, kMapped, 150);
   const TrackedFrame& first = *frames.front();
   ASSERT_GT(first.features.size(), 20u);
@@ -94,13 +93,14 @@ TEST_F(Localisation, TheMapStaysAsItWasLoadedToTheBit) {
 }
 
 TEST_F(Localisation, TheCameraKnowsItsPlaceNoBetterThanTheMapIsKnown) {
-  Tracker following = follower(), mapping = slowTracker();
+  Follower following;
+  Tracker mapping = slowTracker();
   mapping.loadMap(path_);
   const auto a = trackFrames(slowFilm(), &following, kMapped, 150).back();
   const auto b = trackFrames(slowFilm(), &mapping, kMapped, 150).back();
   ASSERT_EQ(a->state, TrackingState::kTracking);
-  EXPECT_GT(a->camera_covariance.topLeftCorner<3, 3>().trace(),
-            b->camera_covariance.topLeftCorner<3, 3>().trace())
+  EXPECT_GT((a->camera_covariance.topLeftCorner<3, 3>().trace()),
+            (b->camera_covariance.topLeftCorner<3, 3>().trace()))
       << "one that learns from what it sees goes on below that";
 }
 
@@ -113,7 +113,7 @@ TEST_F(Localisation, WithoutAMapItWaitsAndSaysSo) {
 }
 
 TEST_F(Localisation, AResetLooksForTheCameraAnewAndKeepsTheMap) {
-  Tracker tracker = follower();
+  Follower tracker;
   trackFrames(slowFilm(), &tracker, kMapped, 110);
   tracker.reset("asked for");
   const Frames again = trackFrames(slowFilm(), &tracker, kMapped, 110);
@@ -123,7 +123,7 @@ TEST_F(Localisation, AResetLooksForTheCameraAnewAndKeepsTheMap) {
 }
 
 TEST_F(Localisation, WhatWouldChangeTheMapIsRefusedByName) {
-  Tracker tracker = follower();
+  Follower tracker;
   trackFrames(slowFilm(), &tracker, kMapped, 95);
   EXPECT_NE(faultOf([&] { tracker.saveMap(path_ + "2"); }).find("mapping"), std::string::npos);
   EXPECT_NE(faultOf([&] { tracker.setScale(2.0); }).find("mapping"), std::string::npos);
@@ -134,7 +134,7 @@ TEST_F(Localisation, ElsewhereNoPoseIsClaimed) {
   options.scene = "office";
   options.seed = 5;
   const Film elsewhere = makeFilm(options);
-  Tracker tracker = follower();
+  Follower tracker;
   for (const auto& frame : trackFrames(elsewhere, &tracker, 0, 60)) {
     EXPECT_EQ(frame->state, TrackingState::kLost);
     EXPECT_EQ(frame->resets, 0);
@@ -155,7 +155,7 @@ Eigen::Isometry3d lastMappedPose(const Frames& mapped) {
 }
 
 TEST_F(Localisation, AGivenPoseIsSearchedAtOnceInWideGates) {
-  Tracker tracker = follower();
+  Follower tracker;
   // Not the first image, nor the fourth after: those are searched for the map without any guess.
   tracker.track(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), slowFilm().frames[kMapped - 1].stamp_s);
   Eigen::Isometry3d guess = lastMappedPose(mapped_);
@@ -169,7 +169,7 @@ TEST_F(Localisation, AGivenPoseIsSearchedAtOnceInWideGates) {
 }
 
 TEST_F(Localisation, APoseThatIsWrongIsNotClaimed) {
-  Tracker tracker = follower();
+  Follower tracker;
   trackFrames(slowFilm(), &tracker, kMapped, kMapped + 10);
   Eigen::Isometry3d wrong = lastMappedPose(mapped_);
   wrong.rotate(Eigen::AngleAxisd(0.8, Eigen::Vector3d::UnitY()));
