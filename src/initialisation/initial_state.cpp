@@ -44,7 +44,7 @@ CameraJacobian lastCameraJacobian(const CameraState& camera, double interval_s) 
 
 std::optional<InitialState> makeInitialState(
     const CameraModel& model, const Ekf& filter, const BundleOptions& options,
-    double correlation_inflation, const Hypothesis& hypothesis,
+    double correlation_inflation, const MotionHypothesis& hypothesis,
     const Eigen::VectorXd& scale_weights, const Accelerations& accelerations, double interval_s) {
   const Bundle& bundle = hypothesis.bundle;
   BundleOptions with_lens = options;
@@ -86,7 +86,8 @@ std::optional<InitialState> makeInitialState(
   return state;
 }
 
-void dropOutliers(const CameraModel& model, const BundleOptions& options, Hypothesis* hypothesis) {
+void dropOutliers(const CameraModel& model, const BundleOptions& options,
+                  MotionHypothesis* hypothesis) {
   Bundle& bundle = hypothesis->bundle;
   const std::vector<double> errors_px = featureErrors(model, bundle);
   const double limit_px = options.loss_scale_sigmas * options.sigma_px;

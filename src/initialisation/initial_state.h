@@ -15,12 +15,13 @@ namespace active_matching_slam {
 std::optional<InitialState> makeInitialState(const CameraModel& model, const Ekf& filter,
                                              const BundleOptions& options,
                                              double correlation_inflation,
-                                             const Hypothesis& hypothesis,
+                                             const MotionHypothesis& hypothesis,
                                              const Eigen::VectorXd& scale_weights,
                                              const Accelerations& accelerations, double interval_s);
 
 /// Takes out features whose image points are outliers on the whole: they are no points of the
 /// scene.
-void dropOutliers(const CameraModel& model, const BundleOptions& options, Hypothesis* hypothesis);
+void dropOutliers(const CameraModel& model, const BundleOptions& options,
+                  MotionHypothesis* hypothesis);
 
 }  // namespace active_matching_slam

@@ -134,7 +134,8 @@ std::optional<InitialState> Initialiser::refine(const CameraModel& model, const 
 }
 
 std::optional<InitialState> Initialiser::commit(const CameraModel& model, const Ekf& filter,
-                                                const BundleOptions& options, Hypothesis adjusted) {
+                                                const BundleOptions& options,
+                                                MotionHypothesis adjusted) {
   BundleOptions by_noise = options;
   by_noise.sigma_px = std::max(estimateSigma(model, adjusted.bundle), options.minimum_sigma_px);
   dropOutliers(model, by_noise, &adjusted);

@@ -229,8 +229,8 @@ bool Keyframes::isConnected(const Bundle& bundle) const {
 
 /// Image points of the `chosen` keyframes, of features with enough of them; cameras and features as
 /// they are made.
-Hypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector<int>& chosen,
-                                     const std::set<FeatureId>& without) const {
+MotionHypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector<int>& chosen,
+                                           const std::set<FeatureId>& without) const {
   std::map<FeatureId, int> sightings;
   // Of a feature's noise its last match says most; of an image's as a whole nothing is assumed
   // here: estimateImageVariances().
@@ -244,7 +244,7 @@ Hypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector
       if (m.sigma_px > 0.0 && median_px > 0.0) relative_sigmas[m.id] = m.sigma_px / median_px;
     }
   }
-  Hypothesis hypothesis;
+  MotionHypothesis hypothesis;
   for (const auto& [id, count] : sightings)
     if (count >= options_.minimum_sightings && without.count(id) == 0) hypothesis.ids.push_back(id);
   Bundle& bundle = hypothesis.bundle;
@@ -270,14 +270,14 @@ Hypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector
   return hypothesis;
 }
 
-std::optional<Hypothesis> Keyframes::rotationOnly(const CameraModel& model,
-                                                  const std::set<FeatureId>& without) const {
+std::optional<MotionHypothesis> Keyframes::rotationOnly(const CameraModel& model,
+                                                        const std::set<FeatureId>& without) const {
   const int last = size() - 1, count = static_cast<int>(options_.candidate_keyframes);
   const int step = std::max(1, (last + count - 2) / (count - 1));
   std::vector<int> chosen;
   for (int k = last; k > 0; k -= step) chosen.insert(chosen.begin(), k);
   chosen.insert(chosen.begin(), 0);
-  Hypothesis hypothesis = observationsOf(model, chosen, without);
+  MotionHypothesis hypothesis = observationsOf(model, chosen, without);
   Bundle& bundle = hypothesis.bundle;
   if (!isConnected(bundle)) return std::nullopt;
   std::vector<bool> is_known(bundle.features.size());
@@ -298,8 +298,8 @@ std::optional<Hypothesis> Keyframes::rotationOnly(const CameraModel& model,
 
 /// Where `known` has them; between two of those in proportion to time; after the last by constant
 /// velocity. The rotations of others fit the features that are known.
-void Keyframes::placeCameras(const CameraModel& model, const Hypothesis& known,
-                             const std::vector<bool>& is_known, Hypothesis* all) const {
+void Keyframes::placeCameras(const CameraModel& model, const MotionHypothesis& known,
+                             const std::vector<bool>& is_known, MotionHypothesis* all) const {
   std::vector<CameraState>& cameras = all->bundle.cameras;
   const auto indexOf = [&known](std::int64_t image) {
     const auto it = std::lower_bound(known.images.begin(), known.images.end(), image);
@@ -330,11 +330,11 @@ void Keyframes::placeCameras(const CameraModel& model, const Hypothesis& known,
   }
 }
 
-std::optional<Hypothesis> Keyframes::extend(const CameraModel& model,
-                                            const Hypothesis& known) const {
+std::optional<MotionHypothesis> Keyframes::extend(const CameraModel& model,
+                                                  const MotionHypothesis& known) const {
   std::vector<int> chosen;
   for (int k = 0; k < size(); ++k) chosen.push_back(k);
-  Hypothesis all = observationsOf(model, chosen, {});
+  MotionHypothesis all = observationsOf(model, chosen, {});
   Bundle& bundle = all.bundle;
   const bool is_first_known = !known.images.empty() && known.images.front() == all.images.front();
   if (!isConnected(bundle) || !is_first_known || known.images.size() < 2) return std::nullopt;

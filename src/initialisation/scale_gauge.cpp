@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kFewFeatures = 10;
 
 /// By which the median depth is what it is in the filter.
-double medianFactor(const Ekf& filter, const Hypothesis& hypothesis) {
+double medianFactor(const Ekf& filter, const MotionHypothesis& hypothesis) {
   std::vector<double> before, now;
   for (std::size_t i = 0; i < hypothesis.ids.size(); ++i) {
     const FeatureState* feature = filter.find(hypothesis.ids[i]);
@@ -28,7 +28,7 @@ double medianFactor(const Ekf& filter, const Hypothesis& hypothesis) {
 }  // namespace
 
 Eigen::VectorXd ScaleGauge::apply(const Ekf& filter, const Eigen::VectorXd& information,
-                                  Hypothesis* hypothesis) {
+                                  MotionHypothesis* hypothesis) {
   const auto& ids = hypothesis->ids;
   auto& features = hypothesis->bundle.features;
   std::vector<Reference> kept;

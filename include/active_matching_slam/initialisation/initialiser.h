@@ -88,13 +88,13 @@ class Initialiser {
   void disambiguate(const CameraModel& model, const Ekf& filter);
   std::optional<InitialState> refine(const CameraModel& model, const Ekf& filter);
   std::optional<InitialState> commit(const CameraModel& model, const Ekf& filter,
-                                     const BundleOptions& options, Hypothesis adjusted);
+                                     const BundleOptions& options, MotionHypothesis adjusted);
   void dropImageFixed(double sigma_px);
 
   InitialiserOptions options_;
   InitialiserState state_ = InitialiserState::kDone;
   Keyframes keyframes_;
-  std::optional<Hypothesis> accepted_;
+  std::optional<MotionHypothesis> accepted_;
   ScaleGauge scale_;
   std::vector<FeatureId> committed_;  ///< features of the last commit, ascending
   std::vector<Eigen::Vector2d> image_fixed_px_;

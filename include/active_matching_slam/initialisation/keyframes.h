@@ -31,7 +31,7 @@ struct Keyframe : KeyframeMeasurements {
 };
 
 /// A bundle of some keyframes.
-struct Hypothesis {
+struct MotionHypothesis {
   Bundle bundle;
   std::vector<FeatureId> ids;        ///< of its features, ascending
   std::vector<std::int64_t> images;  ///< of its cameras, ascending
@@ -68,18 +68,19 @@ class Keyframes {
 
   /// Few keyframes as if the camera had only rotated; the rotations are kept. Empty when they do
   /// not hang together.
-  std::optional<Hypothesis> rotationOnly(const CameraModel& model,
-                                         const std::set<FeatureId>& without) const;
+  std::optional<MotionHypothesis> rotationOnly(const CameraModel& model,
+                                               const std::set<FeatureId>& without) const;
   /// All keyframes: cameras and features of `known` where it has them, other cameras by constant
   /// velocity, other features at the median depth. Empty when they do not hang together.
-  std::optional<Hypothesis> extend(const CameraModel& model, const Hypothesis& known) const;
+  std::optional<MotionHypothesis> extend(const CameraModel& model,
+                                         const MotionHypothesis& known) const;
 
  private:
   void cull(const CameraModel& model);
-  void placeCameras(const CameraModel& model, const Hypothesis& known,
-                    const std::vector<bool>& is_known, Hypothesis* all) const;
-  Hypothesis observationsOf(const CameraModel& model, const std::vector<int>& chosen,
-                            const std::set<FeatureId>& without) const;
+  void placeCameras(const CameraModel& model, const MotionHypothesis& known,
+                    const std::vector<bool>& is_known, MotionHypothesis* all) const;
+  MotionHypothesis observationsOf(const CameraModel& model, const std::vector<int>& chosen,
+                                  const std::set<FeatureId>& without) const;
   bool isConnected(const Bundle& bundle) const;
 
   InitialiserOptions options_;

@@ -18,7 +18,7 @@ class ScaleGauge {
   /// Sets the scale of `hypothesis`; `filter` as it was before, and `information` of its
   /// depthInformation(). Returns the weights of its features in the gauge, of sum 1.
   Eigen::VectorXd apply(const Ekf& filter, const Eigen::VectorXd& information,
-                        Hypothesis* hypothesis);
+                        MotionHypothesis* hypothesis);
   void rescale(double factor);
 
  private:
