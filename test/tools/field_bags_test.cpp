@@ -20,7 +20,7 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kImages = 24;
+constexpr int kFieldImages = 24;
 
 /// One image and its calibration, as they go into the bag.
 struct Recorded {
@@ -68,7 +68,7 @@ class FieldBags : public testing::Test {
     return recorded;
   }
 
-  void write(const std::string& name, const Change& change, int begin = 0, int end = kImages) {
+  void write(const std::string& name, const Change& change, int begin = 0, int end = kFieldImages) {
     rosbag::Bag bag(path(name), rosbag::bagmode::Write);
     for (int i = begin; i < end; ++i) {
       Recorded recorded = recordedOf(i);
@@ -107,12 +107,12 @@ class FieldBags : public testing::Test {
 
 TEST_F(FieldBags, SeveralAreOneRecordingInTheOrderOfTheirTime) {
   const Change same = [](int, Recorded*) {};
-  write("run_1.bag", same, 12, kImages);
+  write("run_1.bag", same, 12, kFieldImages);
   write("run_0.bag", same, 0, 12);
   for (const std::string bags : {"run_0.bag run_1.bag", "run_1.bag run_0.bag"}) {
     const ProgramOutcome outcome = track(bags);
     EXPECT_EQ(outcome.status, 0) << outcome.output;
-    EXPECT_EQ(summary()["frames_tracked"], kImages) << bags;
+    EXPECT_EQ(summary()["frames_tracked"], kFieldImages) << bags;
     EXPECT_EQ(summary()["late_images"], 0) << bags;
   }
 }
@@ -132,7 +132,7 @@ TEST_F(FieldBags, ALateImageIsLeftOutAndToldInTheSummary) {
   const ProgramOutcome outcome = track("late.bag");
   EXPECT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_EQ(summary()["resets"], 0);
-  EXPECT_EQ(summary()["frames_tracked"], kImages - 1);
+  EXPECT_EQ(summary()["frames_tracked"], kFieldImages - 1);
   EXPECT_SAYS(outcome, "1 late images left out");
 }
 
@@ -161,7 +161,7 @@ TEST_F(FieldBags, ACalibrationThatIsZeroAtFirstIsWaitedFor) {
     if (i < 5) recorded->info.K.fill(0.0);
   });
   EXPECT_EQ(track("zero.bag").status, 0);
-  EXPECT_EQ(summary()["frames_tracked"], kImages);
+  EXPECT_EQ(summary()["frames_tracked"], kFieldImages);
 }
 
 TEST_F(FieldBags, ACalibrationThatCanHardlyBeRightStopsUnlessToldToGoOn) {
@@ -190,7 +190,7 @@ TEST_F(FieldBags, RectifiedImagesAreThoseOfTheProjection) {
     recorded->info.distortion_model = "plumb_bob";
   });
   ASSERT_EQ(track("rect.bag", "--image-topic /camera/image_rect").status, 0);
-  EXPECT_EQ(summary()["frames_tracked"], kImages);
+  EXPECT_EQ(summary()["frames_tracked"], kFieldImages);
   std::ifstream map(path("run/final.map"));
   EXPECT_TRUE(map.good());
 }
@@ -202,7 +202,7 @@ TEST_F(FieldBags, TheImagesOfASecondCameraAreLeftOutByNameAndDoNotCount) {
     for (std::uint8_t& pixel : recorded->image.data) pixel = std::uint8_t(255 - pixel);
   });
   EXPECT_EQ(track("two.bag").status, 0);
-  EXPECT_EQ(summary()["frames_tracked"], kImages / 2);
+  EXPECT_EQ(summary()["frames_tracked"], kFieldImages / 2);
   std::ifstream table(path("run/statistics.csv"));
   const std::string text{std::istreambuf_iterator<char>(table), {}};
   EXPECT_NE(text.find("two cameras on one topic"), std::string::npos);
@@ -214,7 +214,7 @@ TEST_F(FieldBags, AMaskIsHeldToAndOneOfAnotherSizeIsNamed) {
   mask.rowRange(90, 150).setTo(0);
   cv::imwrite(path("mask.png"), mask);
   EXPECT_EQ(track("run.bag", "--mask " + path("mask.png")).status, 0);
-  EXPECT_EQ(summary()["frames_tracked"], kImages);
+  EXPECT_EQ(summary()["frames_tracked"], kFieldImages);
   cv::imwrite(path("small.png"), mask.rowRange(0, 100));
   const ProgramOutcome outcome = track("run.bag", "--mask " + path("small.png"));
   EXPECT_EQ(outcome.status, 2);
@@ -241,7 +241,7 @@ TEST_F(FieldBags, AMapIsFollowedAndStaysAsItIs) {
 TEST_F(FieldBags, TheErrorInAnUnknownUnitIsLeftOut) {
   write("run.bag", [](int, Recorded*) {});
   std::ofstream truth(path("truth.txt"));
-  for (int i = 0; i < kImages; ++i)
+  for (int i = 0; i < kFieldImages; ++i)
     truth << 1000.0 + i / 30.0 << " " << 0.03 * i << " 0 0 0 0 0 1\n";
   truth.close();
   const ProgramOutcome outcome = track("run.bag", "--ground-truth " + path("truth.txt"));
