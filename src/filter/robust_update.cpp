@@ -225,6 +225,7 @@ bool RobustUpdate::step(bool first) {
   camera_ = prior_camera_;
   features_ = prior_features_;
   applyError(delta_, camera_, features_);
+  if (is_map_considered_) features_ = prior_features_;  // not even rounded
   // The gauge is the map's: where that stands still there is none to be transported.
   if (!is_map_considered_)
     C_ = gaugeGenerators(camera_, features_, covariance_.size()) - prior_gauge_;

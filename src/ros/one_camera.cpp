@@ -14,7 +14,7 @@ constexpr double kPatience_s = 1.0;
 std::string OneCamera::faultOf(const std_msgs::Header& header, const std::string& publisher) {
   const std::string camera =
       "frame_id '" + header.frame_id + "'" + (publisher.empty() ? "" : " by " + publisher);
-  if (followed_.empty() || std::abs((header.stamp - last_).toSec()) > kPatience_s)
+  if (followed_.empty() || std::abs(header.stamp.toSec() - last_.toSec()) > kPatience_s)
     followed_ = camera;
   if (camera != followed_)
     return "two cameras on one topic: followed is that of " + followed_ + "; left out: " + camera;

@@ -105,8 +105,7 @@ void TrackerRos::track(const CameraImage& image) {
   }
   if (!session_.maskFault().empty()) {
     diagnostics_.recordFault(session_.maskFault());
-    warning_.say("mask",
-                 private_node_.resolveName("mask") + " is not used: " + session_.maskFault());
+    warning_.say(private_node_.resolveName("mask") + " is not used: " + session_.maskFault());
   }
   if (!frame) {
     TrackedFrame told;
@@ -146,8 +145,7 @@ void TrackerRos::publish(const TrackedFrame& frame, const CameraImage& image) {
 
 void TrackerRos::noticeChanges(const TrackedFrame& frame, const ros::Time& stamp) {
   const bool time_jumped = frame.stamp_s < last_stamp_s_;
-  if (session_.generation() != generation_ || frame.resets != resets_ ||
-      frame.map != map_) {
+  if (session_.generation() != generation_ || frame.resets != resets_ || frame.map != map_) {
     if (time_jumped)
       restart_warning_.say("time", "Time ran back by " +
                                        std::to_string(last_stamp_s_ - frame.stamp_s) +

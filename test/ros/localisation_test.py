@@ -43,12 +43,14 @@ class LocalisationTest(harness.TrackerTestCase):
     def test_the_camera_is_followed_in_a_map_that_stays_as_it_is(self):
         poses = self.inbox('pose', PoseWithCovarianceStamped, '/follower')
         waiting = self.feeder.feed_all(self.image(0))['/follower']
-        if waiting.state == TrackingState.WAITING:  # first of the tests to run
+        is_first = waiting.state == TrackingState.WAITING  # of the tests to run: without a map
+        if is_first:
             self.assertIn('no map', waiting.reason)
         path = self.map_and_load()
         with open(path, 'rb') as file:
             content = file.read()
-        self.assertEqual([], poses.messages, 'none is claimed before it is found')
+        if is_first:
+            self.assertEqual([], poses.messages, 'none is claimed before it is found')
         states = [self.feeder.feed_all(self.image(i))['/follower']
                   for i in range(MAPPED, MAPPED + 20)]
         self.assertEqual(TrackingState.TRACKING, states[-1].state, states[-1].reason)
