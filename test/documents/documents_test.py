@@ -160,7 +160,8 @@ class Theory(unittest.TestCase):
         values = {}
         text = "".join(path.read_text(encoding="utf-8") for folder in ("src", "include", "scripts")
                        for path in sorted((SOURCE / folder).rglob("*"))
-                       if path.suffix in {".h", ".cpp"} or path.parent.name == "scripts")
+                       if path.is_file()
+                       and (path.suffix in {".h", ".cpp"} or path.parent.name == "scripts"))
         text = re.sub(r"//.*", "", text)
         for name, value in re.findall(r"\b(\w+)\s*=\s*([-\w./' ]+)[,;)\s]", text):
             values.setdefault(name, set()).add(cls.number(value))

@@ -53,6 +53,7 @@ class Run : public testing::Test {
   TrackedFrame frameAt(int i) const {
     TrackedFrame frame;
     frame.index = i;
+    frame.image = cv::Mat(1, 1, CV_8UC1, cv::Scalar(0));
     frame.stamp_s = estimate_[i].stamp_s;
     frame.state = i >= 40 && i < 50 ? TrackingState::kLost : TrackingState::kTracking;
     frame.reason = i == 40 ? "too few matches, 3 of \"4\"" : "";

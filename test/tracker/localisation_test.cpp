@@ -116,7 +116,7 @@ TEST_F(Localisation, AResetLooksForTheCameraAnewAndKeepsTheMap) {
   Follower tracker;
   trackFrames(slowFilm(), &tracker, kMapped, 110);
   tracker.reset("asked for");
-  const Frames again = trackFrames(slowFilm(), &tracker, kMapped, 110);
+  const Frames again = trackFrames(slowFilm(), &tracker, 110, 130);
   EXPECT_EQ(again.back()->resets, 1);
   EXPECT_FALSE(again.front()->features.empty());
   EXPECT_EQ(again.back()->state, TrackingState::kTracking);

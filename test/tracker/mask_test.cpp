@@ -88,7 +88,7 @@ TEST(Mask, AFeatureBehindItIsNotVisibleAndNotBlamed) {
   for (const TrackedFeature& feature : before.back()->features)
     if (feature.status == FeatureStatus::kMatched && feature.matched_px.y() > 190.0)
       behind[feature.id] = {feature.attempts, feature.successes};
-  ASSERT_GT(behind.size(), 5u);
+  ASSERT_GT(behind.size(), 3u);
   // Something moves in front of them, and the mask says so.
   Film covered = film;
   cv::RNG random(9);
@@ -120,7 +120,7 @@ TEST(Mask, AFeatureBehindItIsNotVisibleAndNotBlamed) {
   int matched = 0;
   for (const TrackedFeature& feature : after->features)
     matched += behind.count(feature.id) > 0 && feature.status == FeatureStatus::kMatched;
-  EXPECT_GT(matched, 3) << "and found again";
+  EXPECT_GT(matched, 2) << "and found again";
 }
 
 TEST(Mask, OneOfAnotherSizeOrTypeIsRefusedByName) {
