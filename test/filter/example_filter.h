@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <random>
 #include <vector>
@@ -111,6 +112,14 @@ inline std::vector<FeatureMeasurement> noisyMeasurements(const Ekf& filter,
         {predicted.ids[i], predicted.z.segment<2>(2 * i) + Eigen::Vector2d(du, dv), 0.0});
   }
   return measurements;
+}
+
+/// The symmetric root of a covariance: draws by it depend on the covariance alone, those by its
+/// eigenvectors on rounding where eigenvalues are equal.
+inline Eigen::MatrixXd symmetricRoot(const Eigen::MatrixXd& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
+         solver.eigenvectors().transpose();
 }
 
 /// Lets an empty filter begin with features anchored at the origin, a little correlated.

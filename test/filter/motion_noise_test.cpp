@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -131,12 +130,9 @@ TEST(MotionNoise, LearnsTheAccelerationsOfACameraFromTheUpdatesOfItsFilter) {
     for (unsigned seed = 1; seed <= 60; ++seed) {
       Ekf filter = exampleFilter(model, 5);
       Random random(seed);
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{
-          Eigen::MatrixXd(filter.covariance())};
       Eigen::VectorXd error(filter.stateSize());
-      for (Eigen::Index i = 0; i < error.size(); ++i)
-        error[i] = random.normal(std::sqrt(std::max(eigen.eigenvalues()[i], 0.0)));
-      error = eigen.eigenvectors() * error;
+      for (double& e : error) e = random.normal();
+      error = symmetricRoot(filter.covariance()) * error;
       CameraState camera = filter.camera();
       std::vector<FeatureState> features = filter.features();
       applyError(error, camera, features);
