@@ -32,28 +32,42 @@ double expectedMatches(const FrameState& frame) {
   return std::accumulate(frame.match_probabilities.begin(), frame.match_probabilities.end(), 0.0);
 }
 
-/// `prior` given how the features moved in the image since the reference image, or else how it
-/// moved as a whole. Empty when both are unknown.
-std::optional<MeasurementPrior> guidedPrior(const FrameState& frame,
-                                            const MeasurementPrior& prior) {
-  if (frame.reference_image.size() != frame.image.size()) return std::nullopt;
-  auto reference_px = frame.reference_px;
-  for (std::size_t i = 0; i < reference_px.size(); ++i)
-    if (!frame.in_reference[i]) reference_px[i].reset();
-  const auto flow_px = trackPoints(frame.reference_image, frame.image, reference_px);
-  if (auto guided = conditionOnFlow(prior, flow_px, flowSigma_px(frame.image.cols))) return guided;
-  const auto motion =
-      estimateImageMotion(frame.reference_image, frame.image,
-                          predictedImageMotion(prior, frame.reference_px), frame.mask.used());
-  if (!motion) return std::nullopt;
-  return conditionOnImageMotion(prior, frame.reference_px, *motion);
-}
+/// How the image moved since the reference image, which is the same whatever the prior.
+class ImageGuide {
+ public:
+  explicit ImageGuide(const FrameState& frame) : frame_(frame) {}
+
+  /// `prior` given how the features moved in the image, or else how it moved as a whole. Empty when
+  /// both are unknown.
+  std::optional<MeasurementPrior> condition(const MeasurementPrior& prior) {
+    if (frame_.reference_image.size() != frame_.image.size()) return std::nullopt;
+    if (auto guided = conditionOnFlow(prior, flowPx(), flowSigma_px(frame_.image.cols)))
+      return guided;
+    const auto motion = estimateImageMotion(frame_.reference_image, frame_.image,
+                                            predictedImageMotion(prior, frame_.reference_px));
+    if (!motion) return std::nullopt;
+    return conditionOnImageMotion(prior, frame_.reference_px, *motion);
+  }
+
+ private:
+  using Points = std::vector<std::optional<Eigen::Vector2d>>;
+
+  const Points& flowPx() {
+    if (flow_px_) return *flow_px_;
+    Points seen = frame_.reference_px;
+    for (std::size_t i = 0; i < seen.size(); ++i)
+      if (!frame_.in_reference[i]) seen[i].reset();
+    flow_px_ = trackPoints(frame_.reference_image, frame_.image, seen);
+    return *flow_px_;
+  }
+
+  const FrameState& frame_;
+  std::optional<Points> flow_px_;
+};
 
 /// The prior of a frame in which the camera jerks.
 MeasurementPrior jerkPrior(const FrameState& frame) {
   MeasurementPrior prior = frame.prior;
-  prior.wide_probability = 0.0;
-  prior.wide_S.resize(0, 0);
   if (frame.jerk_px.cols() > 0) prior.S += frame.jerk_px * frame.jerk_px.transpose();
   return prior;
 }
@@ -97,18 +111,19 @@ void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* 
   const double scale = pixelScale(frame->image.cols, frame->image.rows);
   const bool is_wide = gateArea(frame->prior) > options_.wide_gates_px2 * scale * scale;
   const bool can_jerk = frame->jerk_px.size() > 0 && !frame->jerk_px.isZero();
-  const auto guided = is_wide ? guidedPrior(*frame, frame->prior) : std::nullopt;
+  const MeasurementPrior jerk = jerkPrior(*frame);
+  ImageGuide guide(*frame);
+  const auto guided = is_wide ? guide.condition(frame->prior) : std::nullopt;
   if (can_jerk && !guided) {
-    frame->prior.wide_S = jerkPrior(*frame).S;
+    frame->prior.wide_S = jerk.S;
     frame->prior.wide_probability = frame->jerk_probability;
   }
   frame->matching = matcher_->match(guided ? *guided : frame->prior, frame->search,
                                     withBudget(matching, options_.first_budget_fraction, *frame));
   bool is_jerk = frame->matching.is_wide;
   if (expectedMatches(*frame) >= options_.minimum_expected && isPoor(*frame)) {
-    const MeasurementPrior jerk = jerkPrior(*frame);
     const bool is_tried = is_wide && !can_jerk;
-    const auto guided_jerk = is_tried ? guided : guidedPrior(*frame, jerk);
+    const auto guided_jerk = is_tried ? guided : guide.condition(jerk);
     const MeasurementPrior& wide = guided_jerk ? *guided_jerk : jerk;
     if (!is_tried && (guided_jerk || can_jerk)) is_jerk |= retry(matching, wide, frame);
     if (frame->poor_frames <= options_.maximum_poor_frames)
@@ -116,7 +131,7 @@ void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* 
   }
   if (is_jerk && can_jerk) {
     frame->is_jerk = true;
-    frame->prior = jerkPrior(*frame);
+    frame->prior = jerk;
   }
   if (expectedMatches(*frame) < options_.minimum_expected) return;
   if (!isFalseAlarm(*frame)) return;

@@ -101,8 +101,7 @@ void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedF
 }
 
 Tracker::Implementation::LostMap Tracker::Implementation::storeMap() {
-  LostMap stored{map_number_, lost_stamp_s_, filter_, noise_, map_, map_monitor_, scale_source_};
-  return stored;
+  return {map_number_, lost_stamp_s_, filter_, noise_, map_, map_monitor_, scale_source_};
 }
 
 void Tracker::Implementation::takeMap(LostMap stored) {

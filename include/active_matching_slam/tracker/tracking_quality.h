@@ -27,7 +27,7 @@ class TrackingQuality {
   void add(double interval_s, const QualitySigns& signs, const CameraState& camera,
            const FilterOptions& options);
   double quality() const { return quality_; }  ///< 0 to 1; 1 until enough is known
-  /// The likely cause of a quality below one half; else empty.
+  /// The likely cause of a low quality; else empty.
   const std::string& cause() const { return cause_; }
 
  private:
