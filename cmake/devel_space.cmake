@@ -6,7 +6,7 @@ if(NOT at EQUAL 0)
   return()
 endif()
 set(share ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_SHARE_DESTINATION})
-foreach(name package.xml nodelet_plugins.xml config launch msg rviz srv test)
+foreach(name package.xml nodelet_plugins.xml rviz_plugins.xml config launch msg rviz srv test)
   execute_process(COMMAND ${CMAKE_COMMAND} -E create_symlink
     ${CMAKE_CURRENT_SOURCE_DIR}/${name} ${share}/${name})
 endforeach()

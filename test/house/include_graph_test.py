@@ -19,11 +19,11 @@ FLOORS = [
     {"tracker"},
     {"visualisation"},
     {"ros", "evaluation"},
-    {"experiments"},
+    {"experiments", "rviz_panel"},
     {"tools"},
 ]
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
-WITH_ROS = {"ros", "tools"}
+WITH_ROS = {"ros", "rviz_panel", "tools"}
 ROS_HEADER = re.compile(
     r"<(ros|roscpp|nodelet|pluginlib|cv_bridge|image_transport|camera_info_manager|rosbag|"
     r"dynamic_reconfigure|diagnostic_updater|tf2\w*|\w+_msgs|std_srvs|topic_tools)/"

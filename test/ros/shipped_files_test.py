@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 import unittest
+from xml.etree import ElementTree
 
 import roslaunch
 import rospy
@@ -65,6 +66,16 @@ class ShippedFilesTest(unittest.TestCase):
         remapped = dict(view.remap_args)
         for topic in self.topics_shown('rviz/tracker.rviz'):
             self.assertEqual(topic.replace('/tracker/', '/left/'), remapped[topic])
+
+    def test_the_panel_of_the_view_is_exported_and_follows_the_name(self):
+        with open(os.path.join(PACKAGE, 'rviz/tracker.rviz')) as file:
+            panels = yaml.safe_load(file)['Panels']
+        panel = [p for p in panels if p['Class'].startswith('active_matching_slam/')][0]
+        exported = ElementTree.parse(os.path.join(PACKAGE, 'rviz_plugins.xml')).findall('class')
+        self.assertEqual([panel['Class']], [plugin.get('name') for plugin in exported])
+        named = self.load(self.files('launch/tracker.launch')[0], rviz='true', name='left')
+        view = [node for node in named.nodes if node.type == 'rviz'][0]
+        self.assertEqual('/left', dict(view.remap_args)[panel['Tracker']])
 
     def topics_shown(self, path):
         with open(os.path.join(PACKAGE, path)) as file:
