@@ -42,6 +42,11 @@ struct RunSummary {
   std::string last_reason;  ///< of the last frame that has one: why its state is what it is
   std::string matcher;
   ScaleSource scale_source = ScaleSource::kFree;  ///< at the end
+  double scale_sigma = 0.0;  ///< relative, of lengths as a whole at the end; 0: not known
+  /// Frames whose motion odometry or gyro told of, and those of these in which it was taken for
+  /// slip; frames in which it was missing, or wrong, and what was wrong most often.
+  int frames_with_motion = 0, frames_slipped = 0, frames_without_motion = 0;
+  std::string motion_fault;
   double duration_s = 0.0;                        ///< from first to last stamp
 
   int maps = 0;              ///< in which the camera was tracked

@@ -13,6 +13,7 @@
 #include "active_matching_slam/matching/match_options.h"
 #include "active_matching_slam/math/option_field.h"
 #include "active_matching_slam/tracker/match_cascade_options.h"
+#include "active_matching_slam/tracker/motion_options.h"
 
 namespace active_matching_slam {
 
@@ -48,6 +49,7 @@ struct TrackerOptions {
   MatchCascadeOptions cascade;
   InitialiserOptions initialisation;
   RelocaliserOptions relocaliser;
+  MotionOptions motion;
   std::vector<KnownPoint> known_points;    ///< empty: scale free, world = first camera frame
   double known_points_search_px = 15.0;    ///< how far each may lie from its image_px
   double known_points_sigma_m = 5e-4;      ///< of their positions, per axis
@@ -117,6 +119,7 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
   visit(advancedOption("structure_angular_acceleration_rps2", "rad/s^2",
                        "the same, angular; the less, the more near and far come apart"),
         o.structure_accelerations.angular_rps2, 0.0, 1e3);
+  visitOptions(o.motion, visit);
   visitOptions(o.filter, visit);
   visitOptions(o.image, visit);
   visitOptions(o.map, visit);
