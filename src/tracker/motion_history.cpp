@@ -80,7 +80,14 @@ std::string whatIsMissing(const std::deque<Sample>& samples, double from_s, doub
   if (next == samples.begin()) ++next;
   for (; next != samples.end(); ++next) {
     const double gap_s = next->stamp_s - std::prev(next)->stamp_s;
-    if (gap_s > longest_gap_s) return "a gap of " + inSeconds(gap_s) + " in it";
+    if (gap_s > longest_gap_s) {
+      const double ahead_s = next->stamp_s - to_s;
+      return "a gap of " + inSeconds(gap_s) + " in it" +
+             (ahead_s > std::max(kClockStepS, longest_gap_s)
+                  ? ", and what follows is " + inSeconds(ahead_s) +
+                        " newer than the image: it had stopped, or its clock is another"
+                  : "");
+    }
     if (next->stamp_s >= to_s) break;
   }
   return "";

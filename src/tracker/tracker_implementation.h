@@ -76,6 +76,7 @@ class Tracker::Implementation {
   bool isMetric() const;
   bool isTranslationKnown() const { return motion_ && motion_->velocity_start; }
   bool isPoseKnown() const;
+  Eigen::Matrix<double, 6, 1> widestImpulse() const;
   void learnMotion(const UpdateReport& report, const Accelerations& allowed, bool is_jerk);
   void findScale(TrackedFrame* frame);
   void rescale(double factor);

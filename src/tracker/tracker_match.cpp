@@ -77,11 +77,16 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   prior.noise_variance_px2 = sigma_px * sigma_px;
   const auto impulse = motion_ ? filter_.impulse() : std::nullopt;
   const Eigen::Matrix<double, 6, 1> jerk =
-      impulseVariance(motion_noise_.widest(), current->predicted_interval_s) -
+      widestImpulse() -
       impulse.value_or(
           impulseVariance(motion_noise_.expected(), current->predicted_interval_s));
   current->jerk_px = predicted.impulse_px * jerk.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   current->jerk_probability = motion_noise_.jerkProbability();
+  if (impulse) {
+    const Eigen::Matrix<double, 6, 1> unmeasured =
+        impulseVariance(motion_noise_.widest(), current->predicted_interval_s) - *impulse;
+    current->unmeasured_px = predicted.impulse_px * unmeasured.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {
     if (ids[i] != prior.ids[kept]) continue;
@@ -131,7 +136,7 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   Accelerations allowed = motion_noise_.expected();
   if (current->is_jerk) {
     allowed = motion_noise_.widest();
-    filter_.replaceAccelerations(allowed);
+    filter_.replaceImpulse(widestImpulse());
   }
   // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
   const bool are_depths_guessed = initialiser_.areDepthsGuessed();

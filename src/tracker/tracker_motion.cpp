@@ -38,16 +38,29 @@ void Tracker::Implementation::measureMotion() {
     motion_fault_ = slipText(rotation, predicted_interval_s_, "rotation", "rad");
 }
 
+/// Variance of the impulses that a jerk allows for. A gyroscope does not slip: what it says of
+/// turning holds in a jerk as well.
+Eigen::Matrix<double, 6, 1> Tracker::Implementation::widestImpulse() const {
+  Eigen::Matrix<double, 6, 1> widest =
+      impulseVariance(motion_noise_.widest(), predicted_interval_s_);
+  if (motion_ && motion_->is_biased)
+    if (const auto impulse = filter_.impulse()) widest.tail<3>() = impulse->tail<3>();
+  return widest;
+}
+
 /// Learns the accelerations that a constant velocity leaves out: from what was measured of them
 /// first, before the image found little left; in a jerk, in which that was wrong, from the image.
 void Tracker::Implementation::learnMotion(const UpdateReport& report, const Accelerations& allowed,
                                           bool is_jerk) {
   UpdateReport learnt = report;
-  if (motion_ && !is_jerk) {
+  Accelerations taken = allowed;
+  if (motion_ && (!is_jerk || motion_->is_biased)) {
     learnt.angular = motion_report_.rotation.impulse;
-    if (motion_report_.translation) learnt.linear = motion_report_.translation->impulse;
+    taken.angular_rps2 = motion_noise_.expected().angular_rps2;
   }
-  motion_noise_.learn(learnt, allowed, predicted_interval_s_);
+  if (motion_ && motion_report_.translation && !is_jerk)
+    learnt.linear = motion_report_.translation->impulse;
+  motion_noise_.learn(learnt, taken, predicted_interval_s_);
 }
 
 /// While the scale is free: finds it by how far the odometry has gone meanwhile, and makes the map
