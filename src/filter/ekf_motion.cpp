@@ -9,7 +9,7 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kAxes = 3;
+constexpr int kAxes = 3;  // Derivation: of space
 /// Of a measurement beyond which it is taken for slip. Standard: one in a thousand (Bar-Shalom, Li
 /// & Kirubarajan 2001).
 constexpr double kSlipProbability = 0.999;
@@ -142,7 +142,7 @@ MotionFusion Ekf::fuseMotion(const Eigen::Matrix<double, 3, Eigen::Dynamic>& H,
 MotionReport Ekf::measureMotion(const MotionMeasurement& motion, Corrected corrected) {
   MotionReport report;
   if (!impulse_) return report;
-  constexpr int kLinear = 0, kAngular = 3;
+  constexpr int kLinear = 0, kAngular = 3;  // Derivation: rows of the impulse
   const bool has_bias = motion.is_biased && camera_.gyro_bias_rps.has_value();
   Eigen::Matrix<double, 3, Eigen::Dynamic> H =
       Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, cameraErrorSize(camera_));

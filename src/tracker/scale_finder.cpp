@@ -10,7 +10,10 @@ namespace {
 constexpr double kKnownScale = 0.1;
 /// Cosine of the angle between the two ways below which they contradict each other. Derivation: by
 /// the other side of it, the scale would be off by more than kKnownScale.
-constexpr double kAgreement = 1.0 - kKnownScale;
+constexpr double kAgreement = 0.9;
+/// Standard deviations that a stretch is long at least. Standard: 3 sigma; in a shorter one the
+/// odometry shows its errors.
+constexpr double kStretchSigmas = 3.0;
 
 }  // namespace
 
@@ -19,27 +22,36 @@ void ScaleFinder::add(const UncertainVector& in_map, const UncertainVector& by_o
   in_map_.covariance += in_map.covariance;
   by_odometry_.mean += by_odometry.mean;
   by_odometry_.covariance += by_odometry.covariance;
+  const Eigen::Vector3d &m = in_map_.mean, &d = by_odometry_.mean;
+  const Eigen::Matrix3d &C_m = in_map_.covariance, &C_d = by_odometry_.covariance;
+  if (!(d.squaredNorm() > kStretchSigmas * kStretchSigmas * C_d.trace())) return;
+  map_map_ += m.squaredNorm() - C_m.trace();
+  map_odometry_ += m.dot(d);
+  odometry_odometry_ += d.squaredNorm() - C_d.trace();
+  by_map_errors_ += m.dot(C_m * m);
+  by_odometry_errors_ += m.dot(C_d * m);
+  in_map_ = by_odometry_ = UncertainVector();
+}
+
+/// Of the ratio k by least squares, d = k m: by the errors of d, and of m.
+double ScaleFinder::relativeVariance(double m_per_map_unit) const {
+  return (by_odometry_errors_ / (m_per_map_unit * m_per_map_unit) + by_map_errors_) /
+         (map_map_ * map_map_);
 }
 
 std::optional<ScaleFinder::Scale> ScaleFinder::scale() const {
-  const double way_m = by_odometry_.mean.norm();
-  if (!(way_m > 0.0) || isContradicted()) return std::nullopt;
-  const Eigen::Vector3d u = by_odometry_.mean / way_m;
-  const double way_in_map = u.dot(in_map_.mean);
-  if (!(way_in_map > 0.0)) return std::nullopt;
-  const double variance =
-      u.dot(in_map_.covariance * u) / (way_in_map * way_in_map) +
-      u.dot(by_odometry_.covariance * u) / (way_m * way_m);
+  if (!(map_map_ > 0.0 && map_odometry_ > 0.0) || isContradicted()) return std::nullopt;
+  const double m_per_map_unit = map_odometry_ / map_map_;
+  const double variance = relativeVariance(m_per_map_unit);
   if (!(variance < kKnownScale * kKnownScale)) return std::nullopt;
-  return Scale{way_in_map / way_m, std::sqrt(variance)};
+  return Scale{1.0 / m_per_map_unit, std::sqrt(variance)};
 }
 
 bool ScaleFinder::isContradicted() const {
-  const double way_m = by_odometry_.mean.norm(), way_in_map = in_map_.mean.norm();
-  const double variance = in_map_.covariance.trace() / (way_in_map * way_in_map) +
-                          by_odometry_.covariance.trace() / (way_m * way_m);
-  return variance < kKnownScale * kKnownScale &&
-         in_map_.mean.dot(by_odometry_.mean) < kAgreement * way_m * way_in_map;
+  if (!(map_map_ > 0.0 && odometry_odometry_ > 0.0)) return false;
+  // As well known as the ways' lengths would have it, if they agreed.
+  return relativeVariance(std::sqrt(odometry_odometry_ / map_map_)) < kKnownScale * kKnownScale &&
+         map_odometry_ < kAgreement * std::sqrt(map_map_ * odometry_odometry_);
 }
 
 }  // namespace active_matching_slam

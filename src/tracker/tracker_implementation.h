@@ -78,6 +78,7 @@ class Tracker::Implementation {
   bool isPoseKnown() const;
   Eigen::Matrix<double, 6, 1> widestImpulse() const;
   void learnMotion(const UpdateReport& report, const Accelerations& allowed, bool is_jerk);
+  bool areDepthsKnown() const;
   void findScale(TrackedFrame* frame);
   void rescale(double factor);
   FrameState measure(const cv::Mat& image, double interval_s) const;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 #include "active_matching_slam/math/rotation.h"
 #include "tracker_implementation.h"
@@ -63,13 +64,26 @@ void Tracker::Implementation::learnMotion(const UpdateReport& report, const Acce
   motion_noise_.learn(learnt, taken, predicted_interval_s_);
 }
 
+/// Most of the features in view have become points.
+bool Tracker::Implementation::areDepthsKnown() const {
+  const std::vector<VisibleFeature> visible = visibleFeatures();
+  const auto points = std::count_if(visible.begin(), visible.end(), [this](const auto& feature) {
+    return filter_.find(feature.id)->kind == FeatureKind::kPoint;
+  });
+  return 2 * points > static_cast<std::ptrdiff_t>(visible.size());
+}
+
 /// While the scale is free: finds it by how far the odometry has gone meanwhile, and makes the map
 /// metric as soon as it is known well enough. What is left of its error is uncertainty of all
 /// lengths from there on, which the odometry's displacements go on to correct.
 void Tracker::Implementation::findScale(TrackedFrame* frame) {
-  if (!motion_ || !unscaled_velocity_ || !options_.mapping || !initialiser_.isDone() ||
+  if (!motion_ || !unscaled_velocity_ || !options_.mapping ||
       poor_frames_ > 0 || state_ != TrackingState::kTracking)
     return;
+  if (!initialiser_.isDone() && (initialiser_.areDepthsGuessed() || !areDepthsKnown())) {
+    scale_finder_.reset();  // depths that are corrected correct the way as well
+    return;
+  }
   const CameraState& camera = filter_.camera();
   const double dt = predicted_interval_s_;
   const Eigen::Matrix3d R_start =
@@ -88,6 +102,7 @@ void Tracker::Implementation::findScale(TrackedFrame* frame) {
   }
   const auto scale = scale_finder_.scale();
   if (!scale) return;
+  initialiser_.end();  // its adjustment would leave the unit of length free
   frame->rescaled_by = 1.0 / scale->map_units_per_m;
   rescale(frame->rescaled_by);
   filter_.loosenScale(scale->relative_sigma);

@@ -7,8 +7,9 @@
 
 namespace active_matching_slam {
 
-/// Finds the unit of length of a map of free scale: the ratio of how far the camera has gone in it
-/// and by odometry, from where both began to be added up.
+/// Finds the unit of length of a map of free scale: the ratio of how far the camera has gone by
+/// odometry and in it, over stretches that are each long enough to stand out of the odometry's
+/// errors.
 class ScaleFinder {
  public:
   struct Scale {
@@ -24,7 +25,13 @@ class ScaleFinder {
   bool isContradicted() const;
 
  private:
-  UncertainVector in_map_, by_odometry_;
+  double relativeVariance(double m_per_map_unit) const;
+
+  UncertainVector in_map_, by_odometry_;  ///< of the stretch in hand
+  /// Over the stretches: products of the two ways without what their errors add to them, and what
+  /// the errors of each make of their product.
+  double map_map_ = 0.0, map_odometry_ = 0.0, odometry_odometry_ = 0.0;
+  double by_map_errors_ = 0.0, by_odometry_errors_ = 0.0;
 };
 
 }  // namespace active_matching_slam
