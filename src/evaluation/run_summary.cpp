@@ -23,9 +23,8 @@ int mainMap(const std::vector<FrameRecord>& records) {
   std::map<int, int> frames_in;
   for (const FrameRecord& record : records)
     if (record.isTracked()) ++frames_in[record.map];
-  const auto most = std::max_element(frames_in.begin(), frames_in.end(), [](auto a, auto b) {
-    return a.second < b.second;
-  });
+  const auto most = std::max_element(frames_in.begin(), frames_in.end(),
+                                     [](auto a, auto b) { return a.second < b.second; });
   return most == frames_in.end() ? 0 : most->first;
 }
 
@@ -55,9 +54,10 @@ std::vector<PosePair> posesOf(const std::vector<std::pair<int, int>>& indices,
   return pairs;
 }
 
-/// `pairs` in the world of the map, in which the filter's covariance is stated. A map that was begun
-/// metric has the truth's world; one that became so by odometry has that of the first camera. One of free scale has its gauge fixed at the first camera, known without
-/// error, and the likeliest scale.
+/// `pairs` in the world of the map, in which the filter's covariance is stated. A map that was
+/// begun metric has the truth's world; one that became so by odometry has that of the first camera.
+/// One of free scale has its gauge fixed at the first camera, known without error, and the
+/// likeliest scale.
 std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, ScaleSource source,
                                  const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
   const bool has_own_world = source == ScaleSource::kFree || source == ScaleSource::kOdometry;

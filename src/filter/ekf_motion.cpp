@@ -18,7 +18,9 @@ constexpr double kSlipProbability = 0.999;
 constexpr int kHalvings = 50;
 constexpr double kMostOctaves = 64.0;  ///< Derivation: what is inflated more tells nothing
 
-double squared(const Eigen::Vector3d& y, const Eigen::Matrix3d& S) { return y.dot(S.llt().solve(y)); }
+double squared(const Eigen::Vector3d& y, const Eigen::Matrix3d& S) {
+  return y.dot(S.llt().solve(y));
+}
 
 /// The factor of R by which y^T (S + (factor - 1) R)^-1 y comes down to `limit` (Chang 2014).
 double inflationFor(const Eigen::Vector3d& y, const Eigen::Matrix3d& S, const Eigen::Matrix3d& R,
@@ -133,8 +135,8 @@ MotionFusion Ekf::fuseMotion(const Eigen::Matrix<double, 3, Eigen::Dynamic>& H,
   }
   // What is left of the impulse: no more than of the velocity as a whole.
   const Eigen::Matrix<double, 6, 1> left = P.diagonal().segment<6>(CameraError::kVelocity);
-  impulse_->variance = impulse_->variance.cwiseProduct(
-      Eigen::Matrix<double, 6, 1>::Ones() - resolved);
+  impulse_->variance =
+      impulse_->variance.cwiseProduct(Eigen::Matrix<double, 6, 1>::Ones() - resolved);
   impulse_->variance = impulse_->variance.cwiseMin(left).cwiseMax(0.0);
   return fusion;
 }
@@ -154,9 +156,9 @@ MotionReport Ekf::measureMotion(const MotionMeasurement& motion, Corrected corre
     H.middleCols<3>(CameraError::kGyroBias).setIdentity();
     expected += *camera_.gyro_bias_rps;
   }
-  report.rotation = fuseMotion(H, motion.angular_velocity_camera.mean - expected,
-                               motion.angular_velocity_camera.covariance, kAngular, corrected,
-                               &report.healthy);
+  report.rotation =
+      fuseMotion(H, motion.angular_velocity_camera.mean - expected,
+                 motion.angular_velocity_camera.covariance, kAngular, corrected, &report.healthy);
   if (!motion.velocity_start) return report;
 
   // z = R_s^T v for the rotation R_s at the interval's start, whose error is that of the rotation

@@ -113,10 +113,10 @@ void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& fe
   checkCovariance(covariance, size);
 
   const auto gyro_bias_rps = camera_.gyro_bias_rps;
-  const Eigen::Matrix3d P_bias =
-      gyro_bias_rps ? Eigen::Matrix3d(covariance_.view().block<3, 3>(CameraError::kGyroBias,
-                                                                     CameraError::kGyroBias))
-                    : Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d P_bias = gyro_bias_rps
+                                     ? Eigen::Matrix3d(covariance_.view().block<3, 3>(
+                                           CameraError::kGyroBias, CameraError::kGyroBias))
+                                     : Eigen::Matrix3d::Zero();
   camera_ = camera;
   camera_.gyro_bias_rps = gyro_bias_rps;
   features_ = features;

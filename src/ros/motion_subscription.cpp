@@ -27,14 +27,14 @@ MotionSubscription::MotionSubscription(const ros::NodeHandle& private_node,
   buffer_ = std::make_unique<tf2_ros::Buffer>();
   listener_ = std::make_unique<tf2_ros::TransformListener>(*buffer_);
   ros::NodeHandle node = private_node;
-  topic_ = node.resolveName(
-      ros::names::append(ros::names::parentNamespace(private_node.getNamespace()),
-                         options.hasGyro() ? "imu" : "odometry"));
+  topic_ =
+      node.resolveName(ros::names::append(ros::names::parentNamespace(private_node.getNamespace()),
+                                          options.hasGyro() ? "imu" : "odometry"));
   const auto hints = ros::TransportHints().tcpNoDelay();
-  subscriber_ = options.hasGyro() ? node.subscribe(topic_, kMotionQueueSize,
-                                                   &MotionSubscription::onImu, this, hints)
-                                  : node.subscribe(topic_, kMotionQueueSize,
-                                                   &MotionSubscription::onOdometry, this, hints);
+  subscriber_ =
+      options.hasGyro()
+          ? node.subscribe(topic_, kMotionQueueSize, &MotionSubscription::onImu, this, hints)
+          : node.subscribe(topic_, kMotionQueueSize, &MotionSubscription::onOdometry, this, hints);
 }
 
 MotionSubscription::~MotionSubscription() { subscriber_.shutdown(); }

@@ -97,7 +97,8 @@ void NodeDiagnostics::reportTracking(Status& status) {
       break;
     case TrackingState::kTracking:
       if (!quality_reason_.empty())
-        status.summary(DiagnosticStatus::WARN, "tracking, but not to be trusted: " + quality_reason_);
+        status.summary(DiagnosticStatus::WARN,
+                       "tracking, but not to be trusted: " + quality_reason_);
       else if (!motion_fault_.empty())
         status.summary(DiagnosticStatus::WARN, motion_fault_);
       else if (nis_ratio > 3.0)

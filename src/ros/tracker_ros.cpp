@@ -66,8 +66,7 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
       });
   advertiseServices();
   const std::string scale =
-      settings_.tracker.motion.hasOdometry()
-          ? "scale comes from " + motion_->topic()
+      settings_.tracker.motion.hasOdometry() ? "scale comes from " + motion_->topic()
       : settings_.tracker.known_points.empty()
           ? "scale is free: lengths are in map units until ~set_scale, or start from a known_target"
           : "scale comes from " + settings_.node.known_target;
@@ -190,8 +189,7 @@ void TrackerRos::noticeMotion(const TrackedFrame& frame) {
     ROS_INFO_STREAM(motion_->topic() << ": the map is metric from here on, its scale known to "
                                      << 100.0 * frame.scale_sigma << " %");
   if (!is_told && !fault.empty()) {
-    if (is_motion_told_)
-      ROS_WARN_STREAM(fault << "; constant velocity is assumed until it comes");
+    if (is_motion_told_) ROS_WARN_STREAM(fault << "; constant velocity is assumed until it comes");
     is_motion_told_ = false;
   } else if (is_told) {
     if (!is_motion_told_) ROS_INFO_STREAM(motion_->topic() << ": is used again");

@@ -63,7 +63,8 @@ std::vector<SimulatedOdometry> simulateOdometry(const MotionTruth& truth, double
       step.linear() = step.linear() *
                       rotationFromVector(random(options.odometry_sigma_rad * std::sqrt(turn_rad)))
                           .toRotationMatrix();
-      const bool slips = stamp_s > slip_begin_s && stamp_s <= slip_begin_s + options.slip_duration_s;
+      const bool slips =
+          stamp_s > slip_begin_s && stamp_s <= slip_begin_s + options.slip_duration_s;
       if (slips) step.translation().x() += options.slip_m * interval_s / options.slip_duration_s;
       T_odom_base = T_odom_base * step;
       T_odom_base.linear() = Eigen::Quaterniond(T_odom_base.linear()).normalized().matrix();
@@ -98,12 +99,12 @@ std::vector<SimulatedInertial> simulateInertial(const MotionTruth& truth, double
         (2.0 * kDifferenceS);
     const Eigen::Matrix3d R_base_world =
         T_base_camera.linear() * m.T_world_camera.linear().transpose();
-    inertial.push_back(
-        {stamp_s,
-         T_base_camera.linear() * m.angular_velocity_camera + gyro_bias +
-             random(options.gyro_sigma_rps * per_sample),
-         R_base_world * (acceleration_world - options.gravity_world) + acceleration_bias +
-             random(options.accelerometer_sigma_mps2 * per_sample)});
+    inertial.push_back({stamp_s,
+                        T_base_camera.linear() * m.angular_velocity_camera + gyro_bias +
+                            random(options.gyro_sigma_rps * per_sample),
+                        R_base_world * (acceleration_world - options.gravity_world) +
+                            acceleration_bias +
+                            random(options.accelerometer_sigma_mps2 * per_sample)});
   }
   return inertial;
 }

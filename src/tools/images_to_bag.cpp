@@ -351,7 +351,8 @@ bool parse(int argc, char** argv, Settings* settings) {
       "true poses of the camera (optical frame) in the world, TUM format: 't x y z qx qy qz qw'; "
       "written to /tf (world -> camera_ground_truth) and /ground_truth/pose")(
       "odometry", text(&settings->odometry),
-      "poses of the robot's base by its odometry, TUM format; written to /odom (base_link in odom)")(
+      "poses of the robot's base by its odometry, TUM format; written to /odom (base_link in "
+      "odom)")(
       "imu", text(&settings->imu),
       "'stamp,wx,wy,wz,ax,ay,az' a line [rad/s, m/s^2], in the axes of the base; written to /imu")(
       "extrinsics", po::value(&settings->extrinsics)->multitoken(),

@@ -85,12 +85,12 @@ po::options_description describeOptions(Arguments& a, std::string& size) {
       ("vignetting", po::value(&s.vignetting)->default_value(s.vignetting),
        "loss in the corners")  //
       ("readout-ms", po::value(&s.readout_ms)->default_value(s.readout_ms),
-       "rolling shutter: first to last row")  //
+       "rolling shutter: first to last row")                                 //
       ("occluder", po::bool_switch(&s.occluder), "a hand crosses the view")  //
       ("odometry", po::bool_switch(&a.odometry),
        "also /odom of a robot that carries the camera, with noise and a slip, and /tf_static")  //
       ("slip-m", po::value(&a.sensors.slip_m)->default_value(a.sensors.slip_m),
-       "of the odometry, once, half way through [m]")  //
+       "of the odometry, once, half way through [m]")                                     //
       ("imu", po::bool_switch(&a.imu), "also /imu, with noise and bias, and /tf_static")  //
       ("gyro-bias", po::value(&a.sensors.gyro_bias_rps)->default_value(a.sensors.gyro_bias_rps),
        "of the IMU, per axis, of either sign [rad/s]");

@@ -70,7 +70,8 @@ po::options_description describeOptions(Settings* s) {
   add("localise", po::bool_switch(&s->localise),
       "follow the camera in that map, which stays as it is (mapping: false)");
   add("motion-prior", text(&s->motion_prior),
-      "odometry (makes the map metric) or gyro, of the bag; where the camera is on the robot is read "
+      "odometry (makes the map metric) or gyro, of the bag; where the camera is on the robot is "
+      "read "
       "from its /tf_static");
   add("odometry-topic", text(&s->odometry_topic)->default_value("/odom"), "nav_msgs/Odometry");
   add("imu-topic", text(&s->imu_topic)->default_value("/imu"), "sensor_msgs/Imu");
@@ -244,9 +245,9 @@ void run(const Settings& settings) {
   if (error) throw std::runtime_error(settings.output + ": " + error.message());
 
   Tracker tracker(camera, options);
-  tracker.setMotionHistory(readBagMotion(
-      bags, options.motion.hasGyro() ? settings.imu_topic : settings.odometry_topic,
-      readBagImageFrame(bags, images.topic()), options.motion));
+  tracker.setMotionHistory(
+      readBagMotion(bags, options.motion.hasGyro() ? settings.imu_topic : settings.odometry_topic,
+                    readBagImageFrame(bags, images.topic()), options.motion));
   if (!settings.mask.empty()) setMask(settings.mask, &tracker);
   if (!settings.map.empty()) tracker.loadMap(settings.map);
   std::unique_ptr<AnnotatedVideo> video;

@@ -19,7 +19,8 @@ constexpr std::size_t kMostSamples = 200000;
 /// Of velocities that messages state [m/s, rad/s]. Standard: drivers write 1e3 and more where they
 /// measure nothing; larger ones would only lose digits.
 constexpr double kMostSigma = 1e3;
-/// Stamps that differ by less are the same [s]. Derivation: of seconds since 1970 a double holds 2.4e-7.
+/// Stamps that differ by less are the same [s]. Derivation: of seconds since 1970 a double
+/// holds 2.4e-7.
 constexpr double kSameStampS = 1e-6;
 
 std::string inSeconds(double value_s) {
@@ -102,8 +103,8 @@ OdometrySample interpolated(const std::deque<OdometrySample>& samples, double st
   const double share = (stamp_s - a.stamp_s) / (b.stamp_s - a.stamp_s);
   OdometrySample sample = b;
   sample.stamp_s = stamp_s;
-  sample.T_odom_base.translation() = (1.0 - share) * a.T_odom_base.translation() +
-                                     share * b.T_odom_base.translation();
+  sample.T_odom_base.translation() =
+      (1.0 - share) * a.T_odom_base.translation() + share * b.T_odom_base.translation();
   sample.T_odom_base.linear() = Eigen::Quaterniond(a.T_odom_base.linear())
                                     .slerp(share, Eigen::Quaterniond(b.T_odom_base.linear()))
                                     .toRotationMatrix();
@@ -162,9 +163,8 @@ std::optional<MotionMeasurement> MotionHistory::between(double from_s, double to
                                                         std::string* why) const {
   why->clear();
   if (!(to_s > from_s)) return std::nullopt;
-  *why = options_.hasGyro()
-             ? whatIsMissing(gyro_, from_s, to_s, options_.odometry_timeout_s)
-             : whatIsMissing(odometry_, from_s, to_s, options_.odometry_timeout_s);
+  *why = options_.hasGyro() ? whatIsMissing(gyro_, from_s, to_s, options_.odometry_timeout_s)
+                            : whatIsMissing(odometry_, from_s, to_s, options_.odometry_timeout_s);
   if (!why->empty()) return std::nullopt;
   if (!T_base_camera_) {
     *why = "where the camera is on the robot is not known";

@@ -78,14 +78,14 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   const auto impulse = motion_ ? filter_.impulse() : std::nullopt;
   const Eigen::Matrix<double, 6, 1> jerk =
       widestImpulse() -
-      impulse.value_or(
-          impulseVariance(motion_noise_.expected(), current->predicted_interval_s));
+      impulse.value_or(impulseVariance(motion_noise_.expected(), current->predicted_interval_s));
   current->jerk_px = predicted.impulse_px * jerk.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   current->jerk_probability = motion_noise_.jerkProbability();
   if (impulse) {
     const Eigen::Matrix<double, 6, 1> unmeasured =
         impulseVariance(motion_noise_.widest(), current->predicted_interval_s) - *impulse;
-    current->unmeasured_px = predicted.impulse_px * unmeasured.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    current->unmeasured_px =
+        predicted.impulse_px * unmeasured.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {

@@ -16,7 +16,8 @@ std::string slipText(const MotionFusion& fusion, double interval_s, const char* 
   text.precision(2);
   text << what << " is off by " << fusion.innovation * interval_s << " " << unit << ", where "
        << fusion.innovation_sigma * interval_s
-       << " is likely: taken for slip (if it goes on: the camera's place on the robot, or the clock?)";
+       << " is likely: taken for slip (if it goes on: the camera's place on the robot, or the "
+          "clock?)";
   return text.str();
 }
 
@@ -34,7 +35,8 @@ void Tracker::Implementation::measureMotion() {
   motion_report_ = filter_.measureMotion(*motion_, corrected());
   const MotionFusion& rotation = motion_report_.rotation;
   if (motion_report_.translation && motion_report_.translation->inflation > 1.0)
-    motion_fault_ = slipText(*motion_report_.translation, predicted_interval_s_, "displacement", "m");
+    motion_fault_ =
+        slipText(*motion_report_.translation, predicted_interval_s_, "displacement", "m");
   else if (rotation.inflation > 1.0)
     motion_fault_ = slipText(rotation, predicted_interval_s_, "rotation", "rad");
 }
@@ -77,8 +79,8 @@ bool Tracker::Implementation::areDepthsKnown() const {
 /// metric as soon as it is known well enough. What is left of its error is uncertainty of all
 /// lengths from there on, which the odometry's displacements go on to correct.
 void Tracker::Implementation::findScale(TrackedFrame* frame) {
-  if (!motion_ || !unscaled_velocity_ || !options_.mapping ||
-      poor_frames_ > 0 || state_ != TrackingState::kTracking)
+  if (!motion_ || !unscaled_velocity_ || !options_.mapping || poor_frames_ > 0 ||
+      state_ != TrackingState::kTracking)
     return;
   if (!initialiser_.isDone() && (initialiser_.areDepthsGuessed() || !areDepthsKnown())) {
     scale_finder_.reset();  // depths that are corrected correct the way as well

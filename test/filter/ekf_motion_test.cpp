@@ -48,8 +48,7 @@ TEST(EkfMotion, CovarianceIsThatOfAPlainUpdateByANumericalJacobian) {
     H.col(i) = (ends[1] - ends[0]) / 2e-6;
   }
   const Eigen::MatrixXd P = before.covariance();
-  const Eigen::MatrixXd S =
-      H * P * H.transpose() + sigma * sigma * Eigen::MatrixXd::Identity(6, 6);
+  const Eigen::MatrixXd S = H * P * H.transpose() + sigma * sigma * Eigen::MatrixXd::Identity(6, 6);
   const Eigen::MatrixXd expected = P - P * H.transpose() * S.inverse() * H * P;
 
   Ekf filter = before;
@@ -74,8 +73,8 @@ TEST(EkfMotion, AnExactMeasurementIsBelievedHoweverFarTheCameraHasTurned) {
   motion.angular_velocity_camera = known({20.0, -10.0, 5.0}, 1e-6);  // more than a radian
   motion.velocity_start = known({3.0, 2.0, -4.0}, 1e-6);
   filter.measureMotion(motion, Corrected::kAll);
-  EXPECT_TRUE(filter.camera().angular_velocity_camera.isApprox(
-      motion.angular_velocity_camera.mean, 1e-6));
+  EXPECT_TRUE(
+      filter.camera().angular_velocity_camera.isApprox(motion.angular_velocity_camera.mean, 1e-6));
   EXPECT_TRUE(velocityAtStart(filter.camera()).isApprox(motion.velocity_start->mean, 0.02));
   const Eigen::Quaterniond q_now =
       filter.camera().q_world_camera *
@@ -137,8 +136,7 @@ TEST(EkfMotion, ALoosenedScaleIsFoundByDisplacements) {
   filter.loosenScale(0.1);
   EXPECT_NEAR(filter.scaleSigma(), 0.1, 0.005);
   const FeatureId id = filter.features()[0].id;
-  const double depth =
-      (filter.find(id)->position() - filter.camera().position_world).norm();
+  const double depth = (filter.find(id)->position() - filter.camera().position_world).norm();
   for (int i = 0; i < 30; ++i) {
     filter.predict(kInterval_s);
     const CameraState& camera = filter.camera();

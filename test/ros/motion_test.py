@@ -177,8 +177,9 @@ class MotionTest(harness.TrackerTestCase):
         self.assert_used(self.run_with_motion(8, 12))
 
     def test_another_clock_is_named(self):
+        self.assert_used(self.run_with_motion(0, 5))
         self.log.clear()
-        for index in range(0, 6):
+        for index in range(5, 11):
             states = self.feed(index, shift=rospy.Duration(500))
         for node in self.trackers:
             self.assertEqual('', states[node].motion_source)

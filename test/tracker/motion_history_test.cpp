@@ -55,9 +55,8 @@ TEST(OdometryHistory, TellsHowTheCameraMovedAndNotTheBase) {
   ASSERT_TRUE(motion->velocity_start);
   EXPECT_TRUE((interval_s * motion->velocity_start->mean)
                   .isApprox(Eigen::Vector3d(T_start_end.translation()), 1e-3));
-  EXPECT_TRUE(
-      (interval_s * motion->angular_velocity_camera.mean)
-          .isApprox(vectorFromRotation(Eigen::Quaterniond(T_start_end.linear())), 1e-3));
+  EXPECT_TRUE((interval_s * motion->angular_velocity_camera.mean)
+                  .isApprox(vectorFromRotation(Eigen::Quaterniond(T_start_end.linear())), 1e-3));
   EXPECT_FALSE(motion->is_biased);
 }
 

@@ -51,7 +51,8 @@ TEST(ScaleFinder, TellsNothingWhereTheCameraGoesAnotherWayThanTheOdometry) {
 TEST(ScaleFinder, ARobotThatStandsHasNoScale) {
   ScaleFinder finder;
   for (int i = 0; i < 100; ++i)
-    finder.add(uncertain(Eigen::Vector3d::Zero(), 0.001), uncertain(Eigen::Vector3d::Zero(), 0.001));
+    finder.add(uncertain(Eigen::Vector3d::Zero(), 0.001),
+               uncertain(Eigen::Vector3d::Zero(), 0.001));
   EXPECT_FALSE(finder.scale());
   EXPECT_FALSE(finder.isContradicted());
 }

@@ -35,11 +35,10 @@ NodeSettings readNodeSettings(const ros::NodeHandle& private_node);
 
 /// The tracker as a member of a ROS graph: what node and nodelet share.
 ///
-/// Subscribes to `image` (image_transport) and the camera_info beside it, `initialpose` and ~mask, and,
-/// as motion_prior says, to `odometry` or `imu`; publishes what
-/// FramePublisher, PoseBroadcaster, NodeDiagnostics and ReconfigureServer say; serves ~reset,
-/// ~save_map, ~load_map, ~save_trajectory, ~set_scale, ~set_matcher. Parameters: option_field.h
-/// and node_options.h.
+/// Subscribes to `image` (image_transport) and the camera_info beside it, `initialpose` and ~mask,
+/// and, as motion_prior says, to `odometry` or `imu`; publishes what FramePublisher,
+/// PoseBroadcaster, NodeDiagnostics and ReconfigureServer say; serves ~reset, ~save_map, ~load_map,
+/// ~save_trajectory, ~set_scale, ~set_matcher. Parameters: option_field.h and node_options.h.
 ///
 /// Callbacks must come one at a time; tracking runs in a thread of its own, on the newest image.
 class TrackerRos {

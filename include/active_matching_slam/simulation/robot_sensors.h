@@ -16,8 +16,8 @@ struct RobotSensorOptions {
   double odometry_sigma_rad = 0.01;  ///< per axis, after a radian
   double slip_m = 0.1;               ///< of the wheels, once, half way through: forward
   double slip_duration_s = 0.1;
-  double gyro_sigma_rps = 0.001;       ///< of the mean over a second
-  double gyro_bias_rps = 0.02;         ///< per axis, of either sign
+  double gyro_sigma_rps = 0.001;           ///< of the mean over a second
+  double gyro_bias_rps = 0.02;             ///< per axis, of either sign
   double accelerometer_sigma_mps2 = 0.01;  ///< of the mean over a second
   double accelerometer_bias_mps2 = 0.05;   ///< per axis, of either sign
   Eigen::Vector3d gravity_world = Eigen::Vector3d(0.0, 0.0, -9.81);

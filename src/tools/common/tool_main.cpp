@@ -49,7 +49,8 @@ int runTool(const std::string& name, const std::function<int()>& run) {
 boost::program_options::variables_map readArguments(
     int argc, const char* const* argv, const boost::program_options::options_description& options) {
   namespace po = boost::program_options;
-  const po::parsed_options parsed = po::command_line_parser(argc, argv).options(options).extra_style_parser(takeNumbers).run();
+  const po::parsed_options parsed =
+      po::command_line_parser(argc, argv).options(options).extra_style_parser(takeNumbers).run();
   for (const po::option& option : parsed.options)
     if (option.position_key >= 0)
       throw std::runtime_error("'" + option.value.front() + "' belongs to no option (see --help)");
