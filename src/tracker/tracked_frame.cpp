@@ -32,6 +32,10 @@ std::string scaleSourceName(ScaleSource source) {
       return "known_points";
     case ScaleSource::kService:
       return "service";
+    case ScaleSource::kTag:
+      return "tag";
+    case ScaleSource::kChessboard:
+      return "chessboard";
   }
   return "";
 }

@@ -104,11 +104,16 @@ void Tracker::Implementation::setScale(double factor) {
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   if (!options_.mapping) throw std::runtime_error("mapping is false: the map stays as it is");
   filter_.rescale(factor);
+  rescaleBesideFilter(factor);
+  scale_source_ = ScaleSource::kService;
+}
+
+/// All that has lengths but the filter's state.
+void Tracker::Implementation::rescaleBesideFilter(double factor) {
   motion_noise_.rescale(factor);
   map_.rescale(factor);
   initialiser_.rescale(factor);
   T_world_reference_.translation() *= factor;
-  scale_source_ = ScaleSource::kService;
 }
 
 /// Refuses what can't be tracked, and says why.
@@ -160,6 +165,7 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   updateTrackingState(current);
   retakePatches(current);
   maintainMap(image, frame);
+  followTarget(image, frame);
   frame->timings_ms.map = stage.lap();
   if (options_.structure) updateStructure(frame);
   frame->timings_ms.structure += stage.lap();
