@@ -14,7 +14,8 @@ set_target_properties(${PROJECT_NAME}_rviz PROPERTIES AUTOMOC ON)
 target_compile_definitions(${PROJECT_NAME}_rviz PRIVATE QT_NO_KEYWORDS)
 target_include_directories(${PROJECT_NAME}_rviz SYSTEM PRIVATE ${rviz_INCLUDE_DIRS})
 target_link_libraries(${PROJECT_NAME}_rviz ${PROJECT_NAME}_ros ${rviz_LIBRARIES} Qt5::Widgets)
-install(TARGETS ${PROJECT_NAME}_rviz LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+install(TARGETS ${PROJECT_NAME}_rviz LIBRARY DESTINATION ${AMS_PLUGIN_DESTINATION}
+  COMPONENT rviz)
 
 if(CATKIN_ENABLE_TESTING)
   find_package(Qt5 QUIET COMPONENTS Test)

@@ -25,7 +25,7 @@ NodeSettings readNodeSettings(const ros::NodeHandle& private_node) {
   readParameterTree(bindOptions(&settings.tracker, &settings.node), tree,
                     private_node.getNamespace() + "/");
   if (!settings.node.known_target.empty())
-    settings.tracker.known_points = readKnownPointsYaml(settings.node.known_target);
+    readKnownTargetYaml(settings.node.known_target, &settings.tracker);
   checkTrackerOptions(settings.tracker);
   checkNodeOptions(settings.node);
   return settings;
@@ -67,7 +67,7 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
   advertiseServices();
   const std::string scale =
       settings_.tracker.motion.hasOdometry() ? "scale comes from " + motion_->topic()
-      : settings_.tracker.known_points.empty()
+      : settings_.node.known_target.empty()
           ? "scale is free: lengths are in map units until ~set_scale, or start from a known_target"
           : "scale comes from " + settings_.node.known_target;
   ROS_INFO_STREAM("Tracking images of " << subscription_->imageTopic() << " with "

@@ -106,8 +106,7 @@ TrackerOptions trackerOptionsOf(const Settings& settings) {
   if (!settings.config.empty()) options = readTrackerOptionsYaml(settings.config);
   options.structure = true;  // the report shows it, whatever a live node needs
   options.matching.keep_trace = isAnnotated(settings);
-  if (!settings.known_target.empty())
-    options.known_points = readKnownPointsYaml(settings.known_target);
+  if (!settings.known_target.empty()) readKnownTargetYaml(settings.known_target, &options);
   if (!settings.matcher.empty()) options.matcher = settings.matcher;
   if (settings.features > 0) {
     options.map.features_per_frame = settings.features;

@@ -34,6 +34,10 @@ std::string scaleSourceName(ScaleSource source) {
       return "service";
     case ScaleSource::kOdometry:
       return "odometry";
+    case ScaleSource::kTag:
+      return "tag";
+    case ScaleSource::kChessboard:
+      return "chessboard";
   }
   return "";
 }

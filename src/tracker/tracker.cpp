@@ -110,6 +110,11 @@ void Tracker::Implementation::setScale(double factor) {
 
 void Tracker::Implementation::rescale(double factor) {
   filter_.rescale(factor);
+  rescaleBesideFilter(factor);
+}
+
+/// All that has lengths but the filter's state.
+void Tracker::Implementation::rescaleBesideFilter(double factor) {
   motion_noise_.rescale(factor);
   map_.rescale(factor);
   initialiser_.rescale(factor);
@@ -167,6 +172,7 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   findScale(frame);
   retakePatches(current);
   maintainMap(image, frame);
+  followTarget(image, frame);
   frame->timings_ms.map = stage.lap();
   if (options_.structure) updateStructure(frame);
   frame->timings_ms.structure += stage.lap();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "active_matching_slam/filter/motion_noise.h"
+#include "active_matching_slam/image/target_detector.h"
 #include "active_matching_slam/image/working_size.h"
 #include "active_matching_slam/information/map_structure.h"
 #include "active_matching_slam/initialisation/initialiser.h"
@@ -103,6 +104,10 @@ class Tracker::Implementation {
   void clearMap();
   bool findNearGivenPose(const cv::Mat& image, double interval_s, TrackedFrame* frame);
   Corrected corrected() const { return options_.mapping ? Corrected::kAll : Corrected::kCamera; }
+  void rescaleBesideFilter(double factor);
+  void followTarget(const cv::Mat& image, TrackedFrame* frame);
+  void addTarget(const cv::Mat& image, TrackedFrame* frame);
+  void scaleByTarget(TrackedFrame* frame);
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
@@ -115,9 +120,23 @@ class Tracker::Implementation {
     double inverse_depth;
   };
   std::vector<DepthSample> knownDepths(const std::vector<VisibleFeature>& visible) const;
+  FeatureId addFeature(const Eigen::Vector2d& pixel, const SourcePatch& patch,
+                       const std::vector<DepthSample>& known_depths, std::int64_t index);
   double depthPrior(const Eigen::Vector2d& pixel, std::vector<DepthSample> known) const;
   void describeState(TrackedFrame* frame) const;
   static void describeMatches(FrameState current, TrackedFrame* frame);
+
+  /// Corners of options_.target that are features of a map.
+  struct TargetCorner {
+    FeatureId id;
+    Eigen::Vector2d pixel, position_m;  ///< where it was seen first, and in the target's plane
+  };
+  struct Target {
+    int map = -1;
+    std::vector<TargetCorner> corners;
+    bool is_taken = false;  ///< its size is the unit, for good
+    double sigma_px = 0.0;  ///< of their pixels, per axis
+  };
 
   /// All that is kept of a map while the camera is in another.
   struct LostMap {
@@ -152,6 +171,7 @@ class Tracker::Implementation {
   std::string motion_fault_;
   double predicted_interval_s_ = 0.0;
   ScaleFinder scale_finder_;
+  Target target_;
   MatchCascade cascade_;
   Relocaliser relocaliser_;
   MapStructure structure_;

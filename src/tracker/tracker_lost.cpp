@@ -289,7 +289,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   if (content.template_size_px != options_.image.template_size_px ||
       content.source_patch_size_px != options_.image.source_patch_size_px)
     refuse("the map was made with another image/template_size_px or image/source_patch_size_px");
-  if (content.scale_source < 0 || content.scale_source > static_cast<int>(ScaleSource::kOdometry))
+  if (scaleSourceName(static_cast<ScaleSource>(content.scale_source)).empty())
     refuse("the source of scale is unknown");
   filter_.restore(content.camera_state, content.features, content.covariance, content.next_id);
   map_.clear();

@@ -136,6 +136,25 @@ double Tracker::Implementation::depthPrior(const Eigen::Vector2d& pixel,
   return known[kNeighbours / 2].inverse_depth;
 }
 
+/// A new feature, of unknown depth, seen at `pixel` in image `index`; -1 where there is no ray.
+FeatureId Tracker::Implementation::addFeature(const Eigen::Vector2d& pixel,
+                                              const SourcePatch& patch,
+                                              const std::vector<DepthSample>& known_depths,
+                                              std::int64_t index) {
+  const double relative_sigma =
+      options_.filter.initial_sigma_inverse_depth / options_.filter.initial_inverse_depth;
+  const double inverse_depth = depthPrior(pixel, known_depths);
+  MapFeature feature;
+  feature.id = filter_.addInverseDepthFeature(
+      camera_, pixel, inverse_depth, relative_sigma * inverse_depth, noise_.typicalSigma_px());
+  if (feature.id < 0) return -1;
+  feature.patch = patch;
+  feature.first_frame = feature.last_matched_frame = index;
+  const FeatureId id = feature.id;
+  map_.add(std::move(feature));
+  return id;
+}
+
 int Tracker::Implementation::startFeatures(const cv::Mat& image,
                                            const std::vector<VisibleFeature>& visible, int wanted,
                                            TrackedFrame* frame) {
@@ -153,27 +172,18 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
   const auto& fixed = initialiser_.imageFixedPixels();
   occupied.insert(occupied.end(), fixed.begin(), fixed.end());
   const std::vector<DepthSample> known_depths = knownDepths(visible);
-  const double relative_sigma =
-      options_.filter.initial_sigma_inverse_depth / options_.filter.initial_inverse_depth;
   const double distance_px =
       options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
   int started = 0;
   std::vector<FeatureMeasurement> first_sights;
   for (const Corner& corner :
        detectCorners(image, occupied, wanted, distance_px, options_.image, mask_.patchCentres())) {
-    auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
-                                    options_.image.source_patch_size_px);
+    const auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
+                                          options_.image.source_patch_size_px);
     if (!patch) continue;
-    const double inverse_depth = depthPrior(corner.pixel, known_depths);
-    MapFeature feature;
-    feature.id =
-        filter_.addInverseDepthFeature(camera_, corner.pixel, inverse_depth,
-                                       relative_sigma * inverse_depth, noise_.typicalSigma_px());
-    if (feature.id < 0) continue;
-    first_sights.push_back({feature.id, corner.pixel, 0.0});
-    feature.patch = std::move(*patch);
-    feature.first_frame = feature.last_matched_frame = frame->index;
-    map_.add(std::move(feature));
+    const FeatureId id = addFeature(corner.pixel, *patch, known_depths, frame->index);
+    if (id < 0) continue;
+    first_sights.push_back({id, corner.pixel, 0.0});
     ++started;
   }
   initialiser_.addFirstSights(first_sights);

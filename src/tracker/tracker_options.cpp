@@ -85,10 +85,64 @@ void checkTrackerOptions(const TrackerOptions& options) {
   checkImageOptions(options.image);
   checkMapOptions(options.map);
   checkMotionOptions(options.motion);
+  checkTarget(options.target);
   if (!options.known_points.empty() && options.known_points.size() < kFewestKnownPoints)
     throw std::invalid_argument("known points: " + std::to_string(options.known_points.size()) +
                                 " given, a start needs at least " +
                                 std::to_string(kFewestKnownPoints));
+}
+
+namespace {
+
+/// Of the fields of a target; throws std::runtime_error naming one that is missing, of another
+/// type, or unknown.
+TargetDescription targetFromYaml(const YAML::Node& root, const std::string& kind) {
+  TargetDescription target;
+  std::set<std::string> known = {"kind"};
+  const auto read = [&](const char* name, auto* value) {
+    known.insert(name);
+    if (!root[name]) throw std::runtime_error(std::string(name) + " is missing");
+    try {
+      *value = root[name].as<std::decay_t<decltype(*value)>>();
+    } catch (const YAML::Exception&) {
+      throw std::runtime_error(std::string(name) + " is of the wrong type");
+    }
+  };
+  if (kind == "tag") {
+    target.kind = TargetDescription::Kind::kTag;
+    read("dictionary", &target.dictionary);
+    read("id", &target.id);
+    read("size_m", &target.size_m);
+  } else if (kind == "chessboard") {
+    target.kind = TargetDescription::Kind::kChessboard;
+    read("columns", &target.columns);
+    read("rows", &target.rows);
+    read("square_m", &target.square_m);
+  } else {
+    throw std::runtime_error("kind is '" + kind + "', must be points, tag or chessboard");
+  }
+  refuseUnknownKeys(root, "", known);
+  checkTarget(target);
+  return target;
+}
+
+}  // namespace
+
+void readKnownTargetYaml(const std::string& path, TrackerOptions* options) {
+  const YAML::Node root = loadYaml(path);
+  const bool has_kind = root.IsMap() && root["kind"];
+  try {
+    const std::string kind = has_kind ? root["kind"].as<std::string>() : "points";
+    if (kind != "points") {
+      options->target = targetFromYaml(root, kind);
+      return;
+    }
+  } catch (const YAML::Exception&) {
+    throw std::runtime_error("'" + path + "': kind is not a word");
+  } catch (const std::exception& fault) {
+    throw std::runtime_error("'" + path + "': " + fault.what());
+  }
+  options->known_points = readKnownPointsYaml(path);
 }
 
 std::vector<KnownPoint> readKnownPointsYaml(const std::string& path) {

@@ -259,7 +259,7 @@ class CommandsTest(unittest.TestCase):
         def launch(command):
             self.shell.new_master()
             port = self.shell.environment['ROS_MASTER_URI'].rsplit(':', 1)[1]
-            if 'rviz:=' in command or 'play_bag' in command:  # a window: see test_demo
+            if 'rviz:=' in command or 'play_bag' in command or 'demo.launch' in command:  # a window: see test_demo
                 command = re.sub(r' rviz:=\w+', '', command) + ' rviz:=false'
             self.shell.start(command.replace('roslaunch', 'roslaunch -p ' + port))
             self.shell.wait_for('rosparam get /run_id')
@@ -303,6 +303,8 @@ RECIPES = [
     r'scripts/compare_runs .*',  # in small in test/tools/compare_runs_test.py
     # Run in machines_test.py.
     r'export ROS_.*', r'ping .*',
+    # Made, installed and run on bare systems by .github/workflows/ci.yml.
+    r'scripts/package',
     # For people with a board in the hand, another computer, or a screen.
     r'rosrun camera_calibration .*', r'ntpdate -q .*', r'rosrun image_view .*']
 

@@ -36,7 +36,9 @@ struct OtherValue {
   Table* table;
   void operator()(const OptionField& f, bool value) { (*table)[f.name] = textOf(!value); }
   void operator()(const OptionField& f, UpdateRule) { (*table)[f.name] = "thesis"; }
-  void operator()(const OptionField& f, const std::string&) { (*table)[f.name] = "jcbb"; }
+  void operator()(const OptionField& f, const std::string&) {
+    (*table)[f.name] = f.name == std::string("motion_prior") ? "gyro" : "jcbb";
+  }
   template <class T>
   void operator()(const OptionField& f, T value, T minimum, T maximum) {
     T other;
@@ -395,6 +397,53 @@ TEST(KnownPoints, FewerThanFourAreRefused) {
       messageOf<std::invalid_argument>([&] { checkTrackerOptions(options); });
   expectNames(message, "known points");
   expectNames(message, "4");
+}
+
+TEST(KnownTarget, IsPointsATagOrAChessboard) {
+  TrackerOptions options;
+  readKnownTargetYaml(writeFile("points.yaml", knownPointsText("{position_m: [0, 1, 0], image_px: "
+                                                               "[10, 80]}")),
+                      &options);
+  EXPECT_EQ(options.known_points.size(), 4u);
+  EXPECT_EQ(options.target.kind, TargetDescription::Kind::kNone);
+
+  options = {};
+  readKnownTargetYaml(
+      writeFile("board.yaml", "kind: chessboard\ncolumns: 8\nrows: 6\nsquare_m: 0.025\n"),
+      &options);
+  EXPECT_TRUE(options.known_points.empty());
+  EXPECT_EQ(options.target.kind, TargetDescription::Kind::kChessboard);
+  EXPECT_EQ(options.target.columns, 8);
+  EXPECT_EQ(options.target.rows, 6);
+  EXPECT_EQ(options.target.square_m, 0.025);
+
+  if (tagDictionaries().empty()) GTEST_SKIP() << "OpenCV came without aruco";
+  readKnownTargetYaml(
+      writeFile("tag.yaml", "kind: tag\ndictionary: tag36h11\nid: 3\nsize_m: 0.16\n"), &options);
+  EXPECT_EQ(options.target.kind, TargetDescription::Kind::kTag);
+  EXPECT_EQ(options.target.dictionary, "tag36h11");
+  EXPECT_EQ(options.target.id, 3);
+  EXPECT_EQ(options.target.size_m, 0.16);
+}
+
+TEST(KnownTarget, FaultsAreNamed) {
+  const struct {
+    const char *text, *named;
+  } faults[] = {{"kind: cube\n", "kind is 'cube'"},
+                {"kind: [tag]\n", "kind"},
+                {"kind: chessboard\ncolumns: 8\nrows: 6\n", "square_m is missing"},
+                {"kind: chessboard\ncolumns: 8\nrows: six\nsquare_m: 1\n", "rows"},
+                {"kind: chessboard\ncolumns: 8\nrows: 6\nsquare_m: -1\n", "square_m = -1"},
+                {"kind: chessboard\ncolumns: 8\nrows: 6\nsquare_m: 1\nsize_m: 1\n", "size_m"},
+                {"columns: 8\n", "points"}};
+  for (const auto& fault : faults) {
+    const std::string path = writeFile("fault.yaml", fault.text);
+    TrackerOptions options;
+    const std::string message =
+        messageOf<std::runtime_error>([&] { readKnownTargetYaml(path, &options); });
+    expectNames(message, path);
+    expectNames(message, fault.named);
+  }
 }
 
 }  // namespace

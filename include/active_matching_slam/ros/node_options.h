@@ -43,7 +43,8 @@ void NodeOptions::visitFields(Self& o, Visitor&& visit) {
             .atStartOnly(),
         o.camera_info_url);
   visit(basicOption("known_target", "",
-                    "yaml file with points of known position to start from; empty: scale free")
+                    "yaml file of what makes lengths metric: points to start from, a tag or a "
+                    "chessboard; empty: scale free")
             .atStartOnly(),
         o.known_target);
   visit(basicOption("mask_file", "",

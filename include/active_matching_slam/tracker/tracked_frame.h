@@ -24,7 +24,16 @@ enum class TrackingState {
 };
 std::string trackingStateName(TrackingState state);
 
-enum class ScaleSource { kFree, kKnownTarget, kKnownPoints, kService, kOdometry };
+/// The numbers are those of files and messages.
+enum class ScaleSource {
+  kFree = 0,
+  kKnownTarget = 1,
+  kKnownPoints = 2,
+  kService = 3,
+  kOdometry = 4,
+  kTag = 5,
+  kChessboard = 6
+};
 std::string scaleSourceName(ScaleSource source);
 
 /// What became of a feature in this frame.

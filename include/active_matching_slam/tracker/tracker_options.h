@@ -7,6 +7,7 @@
 
 #include "active_matching_slam/filter/filter_options.h"
 #include "active_matching_slam/image/image_options.h"
+#include "active_matching_slam/image/target_detector.h"
 #include "active_matching_slam/initialisation/initialiser_options.h"
 #include "active_matching_slam/map/map_options.h"
 #include "active_matching_slam/map/relocaliser_options.h"
@@ -50,7 +51,8 @@ struct TrackerOptions {
   InitialiserOptions initialisation;
   RelocaliserOptions relocaliser;
   MotionOptions motion;
-  std::vector<KnownPoint> known_points;    ///< empty: scale free, world = first camera frame
+  std::vector<KnownPoint> known_points;  ///< empty: scale free, world = first camera frame
+  TargetDescription target;  ///< looked for while scale is free; its size makes the map metric
   double known_points_search_px = 15.0;    ///< how far each may lie from its image_px
   double known_points_sigma_m = 5e-4;      ///< of their positions, per axis
   double max_frame_interval_s = 0.5;       ///< after a longer gap the whole image is searched first
@@ -131,6 +133,11 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
 
 /// Throws std::invalid_argument with name, value and what is allowed.
 void checkTrackerOptions(const TrackerOptions& options);
+
+/// Reads a known_target into `known_points` or `target`: kind: tag (dictionary, id, size_m), kind:
+/// chessboard (columns, rows, square_m), or kind: points, as readKnownPointsYaml(), which may be
+/// left out. Throws std::runtime_error naming file and field.
+void readKnownTargetYaml(const std::string& path, TrackerOptions* options);
 
 /// Reads known_target.yaml: points: [{position_m: [x, y, z], image_px: [u, v], template:
 /// file.png}]. Template paths are relative to the yaml file. Throws std::runtime_error naming file
