@@ -2,7 +2,7 @@
 file(GLOB tool_common_sources CONFIGURE_DEPENDS src/tools/common/*.cpp)
 add_library(ams_tools STATIC ${tool_common_sources} src/ros/data_directory.cpp
   src/ros/image_conversions.cpp src/ros/one_camera.cpp src/ros/pose_conversions.cpp
-  src/ros/frame_conversions.cpp)
+  src/ros/motion_conversions.cpp src/ros/frame_conversions.cpp)
 add_dependencies(ams_tools ${PROJECT_NAME}_generate_messages_cpp)
 target_include_directories(ams_tools SYSTEM PUBLIC ${catkin_INCLUDE_DIRS})
 target_link_libraries(ams_tools PUBLIC ams_offline ${catkin_LIBRARIES} ${Boost_LIBRARIES})

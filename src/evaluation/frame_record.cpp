@@ -10,6 +10,10 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.repeated_image = frame.repeated_image;
   record.ignored_image = frame.image.empty();
   record.scale_source = frame.scale_source;
+  record.scale_sigma = frame.scale_sigma;
+  record.rescaled_by = frame.rescaled_by;
+  record.motion_source = frame.motion_source;
+  record.motion_fault = frame.motion_fault;
   record.pose = {frame.stamp_s, frame.camera.poseWorldCamera()};
   record.speed = frame.camera.velocity_world.norm();
   record.pose_covariance = frame.camera_covariance.topLeftCorner<6, 6>();
@@ -39,6 +43,18 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.matching = frame.matching.statistics;
   record.timings_ms = frame.timings_ms;
   return record;
+}
+
+void rescaleRecords(double factor, double scale_sigma, int map, std::vector<FrameRecord>* records) {
+  for (FrameRecord& record : *records) {
+    if (record.map != map) continue;
+    const Eigen::Vector3d position = record.pose.T_world_camera.translation() *= factor;
+    record.speed *= factor;
+    record.pose_covariance.topRows<3>() *= factor;
+    record.pose_covariance.leftCols<3>() *= factor;
+    record.pose_covariance.topLeftCorner<3, 3>() +=
+        scale_sigma * scale_sigma * position * position.transpose();
+  }
 }
 
 }  // namespace active_matching_slam

@@ -74,6 +74,9 @@ void addStateColumns(const FrameErrors& errors, std::vector<Column>* columns) {
       column("times_lost", &FrameRecord::times_lost),
       column("map", &FrameRecord::map),
       column("jumps", &FrameRecord::jumps),
+      column("scale_sigma", &FrameRecord::scale_sigma),
+      column("motion_source", &FrameRecord::motion_source),
+      column("motion_fault", &FrameRecord::motion_fault),
       column("quality", &FrameRecord::quality),
       column("quality_reason", &FrameRecord::quality_reason),
       column("acceleration_mps2", [](R r) { return r.accelerations.linear_mps2; }),
@@ -120,6 +123,10 @@ void addDurationColumns(std::vector<Column>* columns) {
 }  // namespace
 
 void RunReport::add(const TrackedFrame& frame) {
+  if (frame.rescaled_by != 1.0) {
+    rescaleRecords(frame.rescaled_by, frame.scale_sigma, frame.map, &records_);
+    for (auto& [id, position] : last_position_of_) position *= frame.rescaled_by;
+  }
   records_.push_back(recordOf(frame));
   if (frame.graph && frame.submaps) {
     graph_ = frame.graph;

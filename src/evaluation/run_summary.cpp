@@ -23,9 +23,8 @@ int mainMap(const std::vector<FrameRecord>& records) {
   std::map<int, int> frames_in;
   for (const FrameRecord& record : records)
     if (record.isTracked()) ++frames_in[record.map];
-  const auto most = std::max_element(frames_in.begin(), frames_in.end(), [](auto a, auto b) {
-    return a.second < b.second;
-  });
+  const auto most = std::max_element(frames_in.begin(), frames_in.end(),
+                                     [](auto a, auto b) { return a.second < b.second; });
   return most == frames_in.end() ? 0 : most->first;
 }
 
@@ -55,12 +54,14 @@ std::vector<PosePair> posesOf(const std::vector<std::pair<int, int>>& indices,
   return pairs;
 }
 
-/// `pairs` in the world of the map, in which the filter's covariance is stated. A metric map has
-/// the truth's world. One of free scale has its gauge fixed at the first camera, known without
-/// error, and the likeliest scale.
-std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, bool metric,
+/// `pairs` in the world of the map, in which the filter's covariance is stated. A map that was
+/// begun metric has the truth's world; one that became so by odometry has that of the first camera.
+/// One of free scale has its gauge fixed at the first camera, known without error, and the
+/// likeliest scale.
+std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, ScaleSource source,
                                  const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
-  if (metric || pairs.empty()) return pairs;
+  const bool has_own_world = source == ScaleSource::kFree || source == ScaleSource::kOdometry;
+  if (!has_own_world || pairs.empty()) return pairs;
   const Eigen::Isometry3d T_map_truth =
       pairs.front().T_world_camera_estimate * pairs.front().T_world_camera_truth.inverse();
   const Eigen::Vector3d begin = pairs.front().T_world_camera_estimate.translation();
@@ -72,7 +73,9 @@ std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, bool metric,
     estimates.push_back(pair.T_world_camera_estimate);
     truth.push_back(pair.T_world_camera_truth);
   }
-  const double scale = likeliestScale(estimates, truth, covariances).value_or(1.0);
+  const double scale = source == ScaleSource::kOdometry
+                           ? 1.0
+                           : likeliestScale(estimates, truth, covariances).value_or(1.0);
   for (PosePair& pair : pairs) pair.T_world_camera_truth.translation() *= scale;
   return pairs;
 }
@@ -98,6 +101,23 @@ void summariseErrors(const std::vector<FrameRecord>& records, const RunTruth& tr
   for (double value : nees) sum += value;
   summary->nees_mean = sum / static_cast<double>(nees.size());
   summary->nees_fraction_within = fractionWithin(nees, chiSquareMeanBounds(6, 1));
+}
+
+void summariseMotion(const std::vector<FrameRecord>& records, RunSummary* summary) {
+  std::map<std::string, int> faults;
+  for (const FrameRecord& record : records) {
+    const bool is_told = !record.motion_source.empty(), is_faulty = !record.motion_fault.empty();
+    if (is_told) ++summary->frames_with_motion;
+    if (is_told && is_faulty) ++summary->frames_slipped;
+    if (!is_told && is_faulty) ++summary->frames_without_motion;
+    if (!is_told && is_faulty) ++faults[record.motion_fault];
+  }
+  int most = 0;
+  for (const auto& [fault, frames] : faults) {
+    if (frames <= most) continue;
+    most = frames;
+    summary->motion_fault = fault;
+  }
 }
 
 void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summary) {
@@ -198,7 +218,7 @@ FrameErrors frameErrors(const std::vector<FrameRecord>& records, const RunTruth&
   if (!truth.simulated) return errors;
   std::vector<Eigen::Matrix<double, 6, 6>> covariances;
   for (const auto& [r, t] : indices) covariances.push_back(records[r].pose_covariance);
-  const std::vector<PosePair> in_map = inMapWorld(pairs, metric, covariances);
+  const std::vector<PosePair> in_map = inMapWorld(pairs, records.back().scale_source, covariances);
   for (std::size_t i = 0; i < in_map.size(); ++i) {
     const auto nees = normalisedErrorSquared(
         poseError(in_map[i].T_world_camera_estimate, in_map[i].T_world_camera_truth),
@@ -213,6 +233,8 @@ RunSummary summarise(const std::vector<FrameRecord>& records, const RunTruth& tr
   summary.frames = static_cast<int>(records.size());
   if (records.empty()) return summary;
   summary.scale_source = records.back().scale_source;
+  summary.scale_sigma = records.back().scale_sigma;
+  summariseMotion(records, &summary);
   summary.duration_s = records.back().pose.stamp_s - records.front().pose.stamp_s;
   summary.map_features_end = records.back().map_features;
   summariseMatching(records, &summary);

@@ -26,6 +26,11 @@ std::string summaryJson(const RunSummary& s) {
   json["duration_s"] = s.duration_s;
   json["matcher"] = s.matcher.empty() ? Json(nullptr) : Json(s.matcher);
   json["scale_source"] = scaleSourceName(s.scale_source);
+  json["scale_sigma"] = s.scale_sigma > 0.0 ? Json(s.scale_sigma) : Json(nullptr);
+  json["frames_with_motion"] = s.frames_with_motion;
+  json["frames_slipped"] = s.frames_slipped;
+  json["frames_without_motion"] = s.frames_without_motion;
+  json["motion_fault"] = s.motion_fault;
   json["ate_sim3_m"] = orNull(s.ate_sim3_m);
   json["ate_se3_m"] = orNull(s.ate_se3_m);
   json["sim3_scale"] = orNull(s.sim3_scale);

@@ -21,20 +21,29 @@ void Ekf::setOptions(const FilterOptions& options) {
 }
 
 void Ekf::reset(const CameraState& camera, const MotionCovariance& covariance) {
+  // The gyroscope is the same in every map.
+  const auto gyro_bias_rps = camera_.gyro_bias_rps;
+  Eigen::Matrix3d P_bias = Eigen::Matrix3d::Zero();
+  if (gyro_bias_rps)
+    P_bias = covariance_.view().block<3, 3>(CameraError::kGyroBias, CameraError::kGyroBias);
   camera_ = camera;
+  camera_.gyro_bias_rps = gyro_bias_rps;
   camera_.q_world_camera.normalize();
   features_.clear();
-  covariance_.reset(CameraError::kSize);
+  covariance_.reset(cameraErrorSize(camera_));
   impulse_.reset();
   auto P = covariance_.view();
   P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() =
       0.5 * (covariance + covariance.transpose());
-  P.diagonal().tail<CameraError::kCalibrationSize>() = calibrationSigmas(options_).array().square();
+  P.diagonal().segment<CameraError::kCalibrationSize>(CameraError::kMotionSize) =
+      calibrationSigmas(options_).array().square();
+  if (gyro_bias_rps) P.bottomRightCorner<3, 3>() = P_bias;
 }
 
 void Ekf::predict(double interval_s, const Accelerations& sigmas) {
   if (!(interval_s > 0.0) || !std::isfinite(interval_s)) return;
   const Eigen::Vector3d turn = camera_.angular_velocity_camera * interval_s;
+  const Eigen::Quaterniond q_start = camera_.q_world_camera;
   // exp([R (w + dw) dt]x) R = R exp([(w + dw) dt]x): the rotation error gains K dw in the world.
   const Eigen::Matrix3d K =
       camera_.q_world_camera.toRotationMatrix() * leftJacobian(turn) * interval_s;
@@ -52,7 +61,7 @@ void Ekf::predict(double interval_s, const Accelerations& sigmas) {
   MotionCovariance predicted = F * P_camera * F.transpose();
 
   // Impulses V = a dt, Omega = alpha dt enter like the velocities themselves (eq. 3.7).
-  impulse_ = Impulse{interval_s, F.rightCols<6>(), impulseVariance(sigmas, interval_s)};
+  impulse_ = Impulse{interval_s, F.rightCols<6>(), impulseVariance(sigmas, interval_s), q_start};
   predicted += impulse_->G * impulse_->variance.asDiagonal() * impulse_->G.transpose();
   P_camera = 0.5 * (predicted + predicted.transpose());
 
@@ -67,8 +76,11 @@ void Ekf::predict(double interval_s, const Accelerations& sigmas) {
 }
 
 void Ekf::replaceAccelerations(const Accelerations& sigmas) {
+  if (impulse_) replaceImpulse(impulseVariance(sigmas, impulse_->interval_s));
+}
+
+void Ekf::replaceImpulse(const Eigen::Matrix<double, 6, 1>& variance) {
   if (!impulse_) return;
-  const Eigen::Matrix<double, 6, 1> variance = impulseVariance(sigmas, impulse_->interval_s);
   covariance_.view().topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() +=
       impulse_->G * (variance - impulse_->variance).asDiagonal() * impulse_->G.transpose();
   impulse_->variance = variance;

@@ -43,7 +43,7 @@ FeatureState& Ekf::appendFeature(FeatureKind kind) {
 }
 
 void Ekf::assignOffsets() {
-  int offset = CameraError::kSize;
+  int offset = cameraErrorSize(camera_);
   for (FeatureState& feature : features_) {
     feature.offset = offset;
     offset += feature.size();
@@ -152,7 +152,7 @@ void Ekf::removeFeatures(const std::vector<FeatureId>& ids) {
   std::vector<FeatureId> gone(ids);
   std::sort(gone.begin(), gone.end());
   std::vector<FeatureState> kept;
-  std::vector<std::pair<int, int>> ranges{{0, CameraError::kSize}};
+  std::vector<std::pair<int, int>> ranges{{0, cameraErrorSize(camera_)}};
   for (const FeatureState& feature : features_) {
     if (std::binary_search(gone.begin(), gone.end(), feature.id)) continue;
     kept.push_back(feature);
@@ -166,7 +166,7 @@ void Ekf::removeFeatures(const std::vector<FeatureId>& ids) {
 
 std::vector<FeatureId> Ekf::convertToPoints() {
   std::vector<FeatureId> converted;
-  std::vector<std::pair<int, int>> ranges{{0, CameraError::kSize}};
+  std::vector<std::pair<int, int>> ranges{{0, cameraErrorSize(camera_)}};
   auto P = covariance_.view();
   for (FeatureState& feature : features_) {
     if (feature.kind == FeatureKind::kInverseDepth &&

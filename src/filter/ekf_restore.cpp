@@ -79,6 +79,19 @@ void checkCovariance(const Eigen::MatrixXd& P, int size) {
   }
 }
 
+/// `saved` with rows for a gyroscope's bias of which it knows nothing.
+Eigen::MatrixXd withBias(const Eigen::MatrixXd& saved, const Eigen::Matrix3d& P_bias) {
+  constexpr int kBefore = CameraError::kGyroBias, kAfter = kBefore + 3;
+  const Eigen::Index rest = saved.rows() - kBefore;
+  Eigen::MatrixXd P = Eigen::MatrixXd::Zero(kAfter + rest, kAfter + rest);
+  P.topLeftCorner(kBefore, kBefore) = saved.topLeftCorner(kBefore, kBefore);
+  P.topRightCorner(kBefore, rest) = saved.topRightCorner(kBefore, rest);
+  P.bottomLeftCorner(rest, kBefore) = saved.bottomLeftCorner(rest, kBefore);
+  P.bottomRightCorner(rest, rest) = saved.bottomRightCorner(rest, rest);
+  P.block<3, 3>(kBefore, kBefore) = P_bias;
+  return P;
+}
+
 }  // namespace
 
 void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& features,
@@ -99,18 +112,40 @@ void Ekf::restore(const CameraState& camera, const std::vector<FeatureState>& fe
   if (next_id < 0) refuse("the next id " + std::to_string(next_id) + " is negative");
   checkCovariance(covariance, size);
 
+  const auto gyro_bias_rps = camera_.gyro_bias_rps;
+  const Eigen::Matrix3d P_bias = gyro_bias_rps
+                                     ? Eigen::Matrix3d(covariance_.view().block<3, 3>(
+                                           CameraError::kGyroBias, CameraError::kGyroBias))
+                                     : Eigen::Matrix3d::Zero();
   camera_ = camera;
+  camera_.gyro_bias_rps = gyro_bias_rps;
   features_ = features;
   assignOffsets();
   impulse_.reset();
-  covariance_.assign(covariance);
+  if (gyro_bias_rps) {
+    covariance_.assign(withBias(covariance, P_bias));
+  } else {
+    covariance_.assign(covariance);
+  }
   next_id_ = next_id;
+}
+
+Eigen::MatrixXd Ekf::savedCovariance() const {
+  const auto P = covariance_.view();
+  if (!camera_.gyro_bias_rps) return P;
+  constexpr int kBefore = CameraError::kGyroBias, kAfter = kBefore + 3;
+  const int rest = covariance_.size() - kAfter;
+  Eigen::MatrixXd saved(kBefore + rest, kBefore + rest);
+  saved << P.topLeftCorner(kBefore, kBefore), P.topRightCorner(kBefore, rest),
+      P.bottomLeftCorner(rest, kBefore), P.bottomRightCorner(rest, rest);
+  return saved;
 }
 
 void Ekf::relocateCamera(const CameraState& camera, const MotionCovariance& covariance) {
   const CameraState before = camera_;
   camera_ = camera;
   camera_.q_world_camera.normalize();
+  camera_.gyro_bias_rps = before.gyro_bias_rps;
   camera_.readout_s = before.readout_s;
   camera_.lens = before.lens;
   impulse_.reset();

@@ -143,6 +143,9 @@ bool Ekf::correctCameraCovariance(const MotionCovariance& added, const Eigen::Ma
   auto P = covariance_.view();
   const Eigen::VectorXd variances_before = P.diagonal();
   P.leftCols<CameraError::kSize>().noalias() -= X * X.topRows<CameraError::kSize>().transpose();
+  if (camera_.gyro_bias_rps)
+    P.middleCols<3>(CameraError::kGyroBias).noalias() -=
+        X * X.middleRows<3>(CameraError::kGyroBias).transpose();
   P.topLeftCorner<CameraError::kMotionSize, CameraError::kMotionSize>() += added;
   const bool sound = repairVariances(variances_before);
   covariance_.mirrorLower();

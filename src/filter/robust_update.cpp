@@ -220,7 +220,7 @@ bool RobustUpdate::step(bool first) {
   X_.topRows<kMotion>() += more;
   added_.noalias() = more * GK.transpose();
   delta_.noalias() = X_ * llt_.solve(innovation);
-  if (is_map_considered_) delta_.tail(delta_.size() - CameraError::kSize).setZero();
+  if (is_map_considered_) delta_.tail(delta_.size() - cameraErrorSize(camera_)).setZero();
   if (!delta_.allFinite()) return false;
   camera_ = prior_camera_;
   features_ = prior_features_;

@@ -31,6 +31,7 @@ void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& cam
   camera.lens.focal += delta[CameraError::kFocal];
   camera.lens.radial += delta[CameraError::kRadial];
   camera.lens.centre += delta.segment<2>(CameraError::kCentre);
+  if (camera.gyro_bias_rps) *camera.gyro_bias_rps += delta.segment<3>(CameraError::kGyroBias);
   camera.q_world_camera = (rotationFromVector(theta) * camera.q_world_camera).normalized();
   for (FeatureState& feature : features) {
     if (feature.kind == FeatureKind::kPoint) {

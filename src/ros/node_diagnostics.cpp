@@ -36,6 +36,7 @@ void NodeDiagnostics::record(const TrackedFrame& frame, double latency_s, double
   state_ = frame.state;
   reason_ = frame.reason;
   scale_source_ = frame.scale_source;
+  scale_sigma_ = frame.scale_sigma;
   features_ = frame.features.size();
   candidates_ = frame.matching.statistics.candidates;
   matched_ = frame.matching.statistics.matched;
@@ -50,6 +51,15 @@ void NodeDiagnostics::record(const TrackedFrame& frame, double latency_s, double
 void NodeDiagnostics::recordFault(const std::string& fault) {
   const std::lock_guard<std::mutex> lock(mutex_);
   fault_ = fault;
+}
+
+void NodeDiagnostics::recordMotion(const std::string& topic, const std::string& fault,
+                                   bool is_used) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  motion_topic_ = topic;
+  motion_fault_ = fault;
+  ++motion_frames_;
+  if (is_used) ++motion_used_;
 }
 
 void NodeDiagnostics::reportImages(Status& status) {
@@ -87,7 +97,10 @@ void NodeDiagnostics::reportTracking(Status& status) {
       break;
     case TrackingState::kTracking:
       if (!quality_reason_.empty())
-        status.summary(DiagnosticStatus::WARN, "tracking, but not to be trusted: " + quality_reason_);
+        status.summary(DiagnosticStatus::WARN,
+                       "tracking, but not to be trusted: " + quality_reason_);
+      else if (!motion_fault_.empty())
+        status.summary(DiagnosticStatus::WARN, motion_fault_);
       else if (nis_ratio > 3.0)
         status.summary(DiagnosticStatus::WARN, "tracking, but matches disagree with the filter");
       else
@@ -98,6 +111,11 @@ void NodeDiagnostics::reportTracking(Status& status) {
   }
   status.add("state", trackingStateName(state_));
   status.add("scale", scaleSourceName(scale_source_));
+  status.addf("scale known to [%]", "%.2f", 100.0 * scale_sigma_);
+  status.add("motion from", motion_topic_.empty() ? "images alone" : motion_topic_);
+  if (!motion_topic_.empty())
+    status.addf("of images whose motion it told [%]", "%.0f",
+                100.0 * motion_used_ / std::max(1, motion_frames_));
   status.add("matcher", matcher_);
   status.add("features", features_);
   status.add("candidates", candidates_);
@@ -112,7 +130,7 @@ void NodeDiagnostics::reportTracking(Status& status) {
 void NodeDiagnostics::forgetInterval() {
   const std::lock_guard<std::mutex> lock(mutex_);
   interval_start_ = ros::WallTime::now();
-  frames_ = 0;
+  frames_ = motion_frames_ = motion_used_ = 0;
   latency_sum_s_ = turnaround_sum_s_ = turnaround_max_s_ = nis_sum_ = 0.0;
   nis_degrees_sum_ = 0;
 }

@@ -44,6 +44,8 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
   if (!options_.mask_file.empty()) session_.setMask(readMask(options_.mask_file));
   if (!options_.first_map.empty())
     session_.setFirstMap(data_directory_.resolve(options_.first_map));
+  motion_ = std::make_unique<MotionSubscription>(private_node, settings_.tracker.motion);
+  session_.setMotionHistory(motion_->history());
   worker_ = std::make_unique<FrameWorker<CameraImage>>(
       [this](const CameraImage& image) { process(image); });
   subscription_ = std::make_unique<CameraSubscription>(private_node, options_.camera_info_url,
@@ -64,7 +66,8 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
       });
   advertiseServices();
   const std::string scale =
-      settings_.node.known_target.empty()
+      settings_.tracker.motion.hasOdometry() ? "scale comes from " + motion_->topic()
+      : settings_.node.known_target.empty()
           ? "scale is free: lengths are in map units until ~set_scale, or start from a known_target"
           : "scale comes from " + settings_.node.known_target;
   ROS_INFO_STREAM("Tracking images of " << subscription_->imageTopic() << " with "
@@ -84,6 +87,7 @@ TrackerRos::~TrackerRos() {
   initial_pose_.shutdown();
   subscription_.reset();
   worker_->stop();
+  motion_.reset();
 }
 
 void TrackerRos::process(const CameraImage& image) noexcept {
@@ -96,6 +100,7 @@ void TrackerRos::process(const CameraImage& image) noexcept {
 }
 
 void TrackerRos::track(const CameraImage& image) {
+  motion_->collect(image.header().stamp, cameraFrame(image.header()));
   session_.setDemand(publisher_.wantsTrace(), publisher_.wantsStructure());
   const auto frame = session_.process(image);
   if (!session_.fault().empty()) {
@@ -117,6 +122,7 @@ void TrackerRos::track(const CameraImage& image) {
   }
   last_frame_ = frame;
   noticeChanges(*frame, image.header().stamp);
+  noticeMotion(*frame);
   publisher_.publishState(*frame, image.header().stamp);
   if (!session_.fault().empty()) return;
   publish(*frame, image);
@@ -130,6 +136,7 @@ void TrackerRos::publish(const TrackedFrame& frame, const CameraImage& image) {
   camera_frame_ = context.camera_frame = cameraFrame(image.header());
   context.body_frame = options_.base_frame.empty() ? context.camera_frame : options_.base_frame;
   context.dropped_images = worker_->dropped();
+  if (frame.rescaled_by != 1.0) trajectory_.rescale(frame.rescaled_by);
   if (frame.state == TrackingState::kTracking) {
     trajectory_.add(frame);
     context.camera =
@@ -168,6 +175,27 @@ void TrackerRos::noticeChanges(const TrackedFrame& frame, const ros::Time& stamp
     ROS_INFO_STREAM("Tracking; scale: " << scaleSourceName(frame.scale_source));
   else
     ROS_WARN_STREAM("State: " << trackingStateName(state_) << because);
+}
+
+/// Says once that odometry, or IMU, is missing or wrong, and once that it is back.
+void TrackerRos::noticeMotion(const TrackedFrame& frame) {
+  if (!motion_->isOn()) return;
+  const bool is_told = !frame.motion_source.empty();
+  std::string fault = motion_->fault();
+  if (fault.empty() && !frame.motion_fault.empty())
+    fault = motion_->topic() + ": " + frame.motion_fault;
+  diagnostics_.recordMotion(motion_->topic(), fault, is_told);
+  if (frame.rescaled_by != 1.0)
+    ROS_INFO_STREAM(motion_->topic() << ": the map is metric from here on, its scale known to "
+                                     << 100.0 * frame.scale_sigma << " %");
+  if (!is_told && !fault.empty()) {
+    if (is_motion_told_) ROS_WARN_STREAM(fault << "; constant velocity is assumed until it comes");
+    is_motion_told_ = false;
+  } else if (is_told) {
+    if (!is_motion_told_) ROS_INFO_STREAM(motion_->topic() << ": is used again");
+    is_motion_told_ = true;
+    if (!fault.empty()) slip_warning_.say("slip", fault);
+  }
 }
 
 void TrackerRos::forgetPast(bool time_jumped) {
@@ -233,6 +261,7 @@ std::string TrackerRos::applyChanges(const std::vector<ReconfigureServer::Change
     checkNodeOptions(next.node);
     const bool is_done = worker_->call([&] {
       session_.setOptions(next.tracker);
+      motion_->setOptions(next.tracker.motion);
       options_ = next.node;
       publisher_.setOptions(next.node);
       broadcaster_.setOptions(next.node);

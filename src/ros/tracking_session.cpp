@@ -48,6 +48,7 @@ void TrackingSession::takeCalibration(const CameraCalibration& calibration) {
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(std::string("mask_file: ") + error.what());
   }
+  tracker->setMotionHistory(motion_history_);
   if (!first_map_.empty()) tracker->loadMap(first_map_);
   first_map_.clear();
   mask_.reset();

@@ -2,7 +2,9 @@
 
 #include <cv_bridge/cv_bridge.h>
 #include <geometry_msgs/PoseStamped.h>
+#include <nav_msgs/Odometry.h>
 #include <rosbag/bag.h>
+#include <sensor_msgs/Imu.h>
 #include <sensor_msgs/image_encodings.h>
 #include <std_msgs/String.h>
 #include <tf2_eigen/tf2_eigen.h>
@@ -31,6 +33,9 @@ class CameraBagWriter {
   static constexpr const char* kInfoTopic = "/camera/camera_info";
   static constexpr const char* kTruthTopic = "/ground_truth/pose";
   static constexpr const char* kSimulationTopic = "/simulation";
+  static constexpr const char* kOdometryTopic = "/odom";
+  static constexpr const char* kImuTopic = "/imu";
+  static constexpr const char* kBaseFrame = "base_link";
   static constexpr const char* kTruthFrame = "camera_ground_truth";
 
   /// `compressed`: the images as JPEG on /camera/image_raw/compressed instead.
@@ -82,6 +87,39 @@ class CameraBagWriter {
     pose.header = transform.header;
     pose.pose = tf2::toMsg(T_world_camera);
     bag_.write(kTruthTopic, recordTime(stamp), pose);
+  }
+
+  /// Where the camera is on the robot, as static tf.
+  void writeExtrinsics(const ros::Time& stamp, const Eigen::Isometry3d& T_base_camera) {
+    geometry_msgs::TransformStamped transform = tf2::eigenToTransform(T_base_camera);
+    transform.header.stamp = stamp;
+    transform.header.frame_id = kBaseFrame;
+    transform.child_frame_id = info_.header.frame_id;
+    tf2_msgs::TFMessage tf;
+    tf.transforms.push_back(transform);
+    bag_.write("/tf_static", recordTime(stamp), tf);
+  }
+
+  /// A pose of the robot's base as its odometry has it; without covariances.
+  void writeOdometry(const ros::Time& stamp, const Eigen::Isometry3d& T_odom_base) {
+    nav_msgs::Odometry odometry;
+    odometry.header.stamp = stamp;
+    odometry.header.frame_id = "odom";
+    odometry.child_frame_id = kBaseFrame;
+    odometry.pose.pose = tf2::toMsg(T_odom_base);
+    bag_.write(kOdometryTopic, recordTime(stamp), odometry);
+  }
+
+  /// In the axes of the robot's base [rad/s, m/s^2]; without an orientation.
+  void writeImu(const ros::Time& stamp, const Eigen::Vector3d& angular_velocity,
+                const Eigen::Vector3d& acceleration) {
+    sensor_msgs::Imu imu;
+    imu.header.stamp = stamp;
+    imu.header.frame_id = kBaseFrame;
+    imu.orientation_covariance[0] = -1.0;
+    tf2::toMsg(angular_velocity, imu.angular_velocity);
+    tf2::toMsg(acceleration, imu.linear_acceleration);
+    bag_.write(kImuTopic, recordTime(stamp), imu);
   }
 
   /// Marks the bag as simulated, its truth as exact: how it was made, in words.

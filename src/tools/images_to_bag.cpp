@@ -11,6 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -27,7 +28,8 @@ namespace fs = boost::filesystem;
 namespace po = boost::program_options;
 
 struct Settings {
-  std::string images, times, camera_info, ground_truth, output, frame_id;
+  std::string images, times, camera_info, ground_truth, odometry, imu, output, frame_id;
+  std::vector<double> extrinsics;  ///< X Y Z QX QY QZ QW, or none
   double rate_hz = 0.0;
   bool grey = false, compressed = false;
 };
@@ -39,7 +41,12 @@ struct TimedName {
 
 struct TimedPose {
   ros::Time stamp;
-  Eigen::Isometry3d T_world_camera;
+  Eigen::Isometry3d T_world_child;
+};
+
+struct TimedInertial {
+  ros::Time stamp;
+  Eigen::Vector3d angular_velocity, acceleration;
 };
 
 [[noreturn]] void fail(const std::string& what) { throw std::runtime_error(what); }
@@ -90,23 +97,55 @@ std::vector<TimedName> readTimes(const std::string& path) {
   return times;
 }
 
+double parseNumber(const std::string& text, const std::string& place) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (*end != '\0' || !std::isfinite(value)) fail(place + ": '" + text + "' is not a number");
+  return value;
+}
+
+/// stamp,wx,wy,wz,ax,ay,az; a first line of names is passed over.
+std::vector<TimedInertial> readInertial(const std::string& path) {
+  std::vector<TimedInertial> samples;
+  bool is_first = true;
+  forEachLine(path, [&](const std::vector<std::string>& words, const std::string& place) {
+    std::string line;
+    for (const std::string& word : words) line += word;
+    std::vector<std::string> cells;
+    std::istringstream stream(line);
+    for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
+    const bool is_header = is_first && !cells.empty() && !cells[0].empty() &&
+                           std::isalpha(static_cast<unsigned char>(cells[0][0]));
+    is_first = false;
+    if (is_header) return;
+    if (cells.size() != 7) fail(place + ": must hold 7 numbers, stamp,wx,wy,wz,ax,ay,az");
+    TimedInertial sample;
+    sample.stamp = parseStamp(cells[0], place);
+    for (int i = 0; i < 3; ++i) {
+      sample.angular_velocity[i] = parseNumber(cells[i + 1], place);
+      sample.acceleration[i] = parseNumber(cells[i + 4], place);
+    }
+    samples.push_back(sample);
+  });
+  if (samples.empty()) fail(path + ": holds no measurements");
+  std::stable_sort(
+      samples.begin(), samples.end(),
+      [](const TimedInertial& a, const TimedInertial& b) { return a.stamp < b.stamp; });
+  return samples;
+}
+
 /// TUM format: t tx ty tz qx qy qz qw.
-std::vector<TimedPose> readTruth(const std::string& path) {
+std::vector<TimedPose> readPoses(const std::string& path) {
   std::vector<TimedPose> poses;
   forEachLine(path, [&](const std::vector<std::string>& words, const std::string& place) {
     if (words.size() != 8) fail(place + ": must hold 8 numbers, t tx ty tz qx qy qz qw");
     double v[7];
-    for (int i = 0; i < 7; ++i) {
-      char* end = nullptr;
-      v[i] = std::strtod(words[i + 1].c_str(), &end);
-      if (*end != '\0' || !std::isfinite(v[i]))
-        fail(place + ": '" + words[i + 1] + "' is not a number");
-    }
+    for (int i = 0; i < 7; ++i) v[i] = parseNumber(words[i + 1], place);
     const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
     if (std::abs(q.norm() - 1.0) > 0.01) fail(place + ": the quaternion does not have unit length");
     TimedPose pose{parseStamp(words[0], place), Eigen::Isometry3d::Identity()};
-    pose.T_world_camera.linear() = q.normalized().toRotationMatrix();
-    pose.T_world_camera.translation() << v[0], v[1], v[2];
+    pose.T_world_child.linear() = q.normalized().toRotationMatrix();
+    pose.T_world_child.translation() << v[0], v[1], v[2];
     poses.push_back(pose);
   });
   if (poses.empty()) fail(path + ": holds no poses");
@@ -221,6 +260,19 @@ cv::Mat toWritable(const cv::Mat& image, bool grey) {
   return result;
 }
 
+std::optional<Eigen::Isometry3d> extrinsicsOf(const Settings& settings) {
+  if (settings.extrinsics.empty()) return std::nullopt;
+  const std::vector<double>& v = settings.extrinsics;
+  if (v.size() != 7)
+    fail("--extrinsics has " + std::to_string(v.size()) + " numbers, must be X Y Z QX QY QZ QW");
+  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
+  if (!(std::abs(q.norm() - 1.0) < 0.01)) fail("--extrinsics: the quaternion has no unit length");
+  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
+  T_base_camera.linear() = q.normalized().toRotationMatrix();
+  T_base_camera.translation() << v[0], v[1], v[2];
+  return T_base_camera;
+}
+
 void convert(const Settings& settings) {
   const CameraCalibration calibration = readCalibrationYaml(settings.camera_info);
   for (const std::string& doubt : calibrationDoubts(calibration))
@@ -229,18 +281,28 @@ void convert(const Settings& settings) {
   const std::vector<TimedName> times =
       settings.times.empty() ? std::vector<TimedName>() : readTimes(settings.times);
   const std::vector<TimedPose> truth =
-      settings.ground_truth.empty() ? std::vector<TimedPose>() : readTruth(settings.ground_truth);
+      settings.ground_truth.empty() ? std::vector<TimedPose>() : readPoses(settings.ground_truth);
+  const std::vector<TimedPose> odometry =
+      settings.odometry.empty() ? std::vector<TimedPose>() : readPoses(settings.odometry);
+  const std::vector<TimedInertial> imu =
+      settings.imu.empty() ? std::vector<TimedInertial>() : readInertial(settings.imu);
+  const std::optional<Eigen::Isometry3d> T_base_camera = extrinsicsOf(settings);
   if (!fs::exists(settings.images)) fail(settings.images + ": does not exist");
   const std::unique_ptr<FrameSource> source = fs::is_directory(settings.images)
                                                   ? openFolder(settings, times)
                                                   : std::make_unique<VideoSource>(settings.images);
 
   CameraBagWriter writer(settings.output, calibration, settings.frame_id, settings.compressed);
-  std::size_t frames = 0, poses = 0;
+  std::size_t frames = 0, poses = 0, moved = 0, inertial = 0;
   ros::Time first, last;
-  const auto writeTruthUntil = [&](const ros::Time& stamp) {
+  const auto writePosesUntil = [&](const ros::Time& stamp) {
     for (; poses < truth.size() && truth[poses].stamp <= stamp; ++poses)
-      writer.writeTruth(truth[poses].stamp, truth[poses].T_world_camera);
+      writer.writeTruth(truth[poses].stamp, truth[poses].T_world_child);
+    for (; moved < odometry.size() && odometry[moved].stamp <= stamp; ++moved)
+      writer.writeOdometry(odometry[moved].stamp, odometry[moved].T_world_child);
+    for (; inertial < imu.size() && imu[inertial].stamp <= stamp; ++inertial)
+      writer.writeImu(imu[inertial].stamp, imu[inertial].angular_velocity,
+                      imu[inertial].acceleration);
   };
   for (cv::Mat image; !(image = source->next()).empty(); ++frames) {
     if (!times.empty() && frames == times.size())
@@ -253,25 +315,30 @@ void convert(const Settings& settings) {
     last = times.empty() ? ros::Time(static_cast<double>(frames) / settings.rate_hz)
                          : times[frames].stamp;
     if (frames == 0) first = last;
-    writeTruthUntil(last);
+    if (frames == 0 && T_base_camera) writer.writeExtrinsics(first, *T_base_camera);
+    writePosesUntil(last);
     writer.writeImage(last, toWritable(image, settings.grey));
   }
   if (frames < times.size())
     fail(settings.times + ": has " + std::to_string(times.size()) + " times, but there are " +
          std::to_string(frames) + " images");
   if (frames == 0) fail(settings.images + ": holds no images");
-  writeTruthUntil(ros::TIME_MAX);
+  writePosesUntil(ros::TIME_MAX);
   writer.close();
   std::cout << settings.output << ": " << frames << " images " << calibration.width << "x"
             << calibration.height << ", " << (last - first).toSec() << " s, " << poses
-            << " true poses\n";
+            << " true poses";
+  if (moved > 0) std::cout << ", " << moved << " of odometry";
+  if (inertial > 0) std::cout << ", " << inertial << " of an IMU";
+  std::cout << "\n";
 }
 
 /// False when the help was asked for and printed.
 bool parse(int argc, char** argv, Settings* settings) {
   po::options_description options(
       "images_to_bag --images DIR_OR_VIDEO --times times.txt|--rate HZ --camera-info camera.yaml\n"
-      "              [--ground-truth groundtruth.txt] --output X.bag\n\nOptions");
+      "              [--ground-truth groundtruth.txt] [--odometry odometry.txt] [--imu imu.csv]\n"
+      "              [--extrinsics X Y Z QX QY QZ QW] --output X.bag\n\nOptions");
   const auto text = [](std::string* value) { return po::value<std::string>(value); };
   options.add_options()("help,h", "this text")("images", text(&settings->images)->required(),
                                                "folder of images, or a video")(
@@ -283,6 +350,13 @@ bool parse(int argc, char** argv, Settings* settings) {
       "ground-truth", text(&settings->ground_truth),
       "true poses of the camera (optical frame) in the world, TUM format: 't x y z qx qy qz qw'; "
       "written to /tf (world -> camera_ground_truth) and /ground_truth/pose")(
+      "odometry", text(&settings->odometry),
+      "poses of the robot's base by its odometry, TUM format; written to /odom (base_link in "
+      "odom)")(
+      "imu", text(&settings->imu),
+      "'stamp,wx,wy,wz,ax,ay,az' a line [rad/s, m/s^2], in the axes of the base; written to /imu")(
+      "extrinsics", po::value(&settings->extrinsics)->multitoken(),
+      "X Y Z QX QY QZ QW: the camera (optical frame) in the robot's base; written to /tf_static")(
       "output", text(&settings->output)->required(), "the bag to write")(
       "frame-id", text(&settings->frame_id)->default_value("camera_optical_frame"),
       "frame of the images")("grey", po::bool_switch(&settings->grey), "write mono8")(

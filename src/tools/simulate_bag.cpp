@@ -6,9 +6,12 @@
 #include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <limits>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "active_matching_slam/simulation/robot_sensors.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "camera_bag_writer.h"
 #include "common/progress_bar.h"
@@ -21,7 +24,9 @@ namespace {
 
 struct Arguments {
   ams::SimulatorOptions simulator;
+  ams::RobotSensorOptions sensors;
   std::string output;
+  bool odometry = false, imu = false;
   bool show_help = false;
   bool show_list = false;
 };
@@ -80,8 +85,15 @@ po::options_description describeOptions(Arguments& a, std::string& size) {
       ("vignetting", po::value(&s.vignetting)->default_value(s.vignetting),
        "loss in the corners")  //
       ("readout-ms", po::value(&s.readout_ms)->default_value(s.readout_ms),
-       "rolling shutter: first to last row")  //
-      ("occluder", po::bool_switch(&s.occluder), "a hand crosses the view");
+       "rolling shutter: first to last row")                                 //
+      ("occluder", po::bool_switch(&s.occluder), "a hand crosses the view")  //
+      ("odometry", po::bool_switch(&a.odometry),
+       "also /odom of a robot that carries the camera, with noise and a slip, and /tf_static")  //
+      ("slip-m", po::value(&a.sensors.slip_m)->default_value(a.sensors.slip_m),
+       "of the odometry, once, half way through [m]")                                     //
+      ("imu", po::bool_switch(&a.imu), "also /imu, with noise and bias, and /tf_static")  //
+      ("gyro-bias", po::value(&a.sensors.gyro_bias_rps)->default_value(a.sensors.gyro_bias_rps),
+       "of the IMU, per axis, of either sign [rad/s]");
   return options;
 }
 
@@ -152,6 +164,39 @@ std::string describe(const ams::SimulatorOptions& options) {
          std::to_string(options.seed);
 }
 
+/// What the robot's sensors say up to a stamp, between the images.
+class SensorWriter {
+ public:
+  SensorWriter(const Arguments& arguments, const ams::Simulator& simulator) {
+    ams::RobotSensorOptions options = arguments.sensors;
+    options.seed = arguments.simulator.seed;
+    const auto truth = [&simulator](double stamp_s) { return simulator.truthAt(stamp_s); };
+    const double begin_s = ams::Simulator::kFirstStampS;
+    const double end_s = begin_s + simulator.frameCount() / arguments.simulator.rate_hz;
+    if (arguments.odometry) odometry_ = ams::simulateOdometry(truth, begin_s, end_s, options);
+    if (arguments.imu) inertial_ = ams::simulateInertial(truth, begin_s, end_s, options);
+  }
+  void writeUntil(double stamp_s, ams::CameraBagWriter* bag) {
+    if (odometry_written_ + inertial_written_ == 0 && !(odometry_.empty() && inertial_.empty()))
+      bag->writeExtrinsics(ros::Time(stamp_s), ams::simulatedCameraOnBase());
+    for (; odometry_written_ < odometry_.size(); ++odometry_written_) {
+      const ams::SimulatedOdometry& sample = odometry_[odometry_written_];
+      if (sample.stamp_s > stamp_s) break;
+      bag->writeOdometry(ros::Time(sample.stamp_s), sample.T_odom_base);
+    }
+    for (; inertial_written_ < inertial_.size(); ++inertial_written_) {
+      const ams::SimulatedInertial& sample = inertial_[inertial_written_];
+      if (sample.stamp_s > stamp_s) break;
+      bag->writeImu(ros::Time(sample.stamp_s), sample.angular_velocity, sample.acceleration);
+    }
+  }
+
+ private:
+  std::vector<ams::SimulatedOdometry> odometry_;
+  std::vector<ams::SimulatedInertial> inertial_;
+  std::size_t odometry_written_ = 0, inertial_written_ = 0;
+};
+
 void simulate(const Arguments& arguments) {
   ams::Simulator simulator(arguments.simulator);
   const ams::CameraCalibration& calibration = simulator.camera().calibration();
@@ -163,15 +208,18 @@ void simulate(const Arguments& arguments) {
   truth << std::setprecision(12)
         << "# stamp_s x y z qx qy qz qw: the camera's optical frame in the world [m]\n";
 
+  SensorWriter sensors(arguments, simulator);
   ams::ProgressBar progress("simulate_bag", simulator.frameCount());
   while (const auto frame = simulator.next()) {
     const ros::Time stamp(frame->stamp_s);
     if (frame->index == 0) bag.writeSimulation(stamp, describe(arguments.simulator));
+    sensors.writeUntil(frame->stamp_s, &bag);
     bag.writeTruth(stamp, frame->truth.T_world_camera);
     bag.writeImage(stamp, frame->image);
     writeTumLine(truth, stamp, frame->truth.T_world_camera);
     progress.advance(frame->index + 1, "");
   }
+  sensors.writeUntil(std::numeric_limits<double>::infinity(), &bag);
   if (!truth.flush()) throw std::runtime_error("cannot write '" + stem + ".groundtruth.txt'");
   truth_file.commit();
   camera_file.commit();

@@ -23,6 +23,7 @@
 #include "active_matching_slam/visualisation/debug_image.h"
 #include "camera_bag_writer.h"
 #include "common/bag_image_source.h"
+#include "common/bag_motion.h"
 #include "common/progress_bar.h"
 #include "common/tool_main.h"
 #include "tracked_bag_writer.h"
@@ -36,6 +37,7 @@ namespace po = boost::program_options;
 struct Settings {
   std::string image_topic, camera_info_topic, camera_info, config, known_target, matcher;
   std::string ground_truth, ground_truth_topic, output, mask, map;
+  std::string motion_prior, odometry_topic, imu_topic;
   std::vector<std::string> bags, set, draw;
   int features = 0;
   RunOptions run;
@@ -67,6 +69,12 @@ po::options_description describeOptions(Settings* s) {
   add("map", text(&s->map), "begin with a map that was saved before");
   add("localise", po::bool_switch(&s->localise),
       "follow the camera in that map, which stays as it is (mapping: false)");
+  add("motion-prior", text(&s->motion_prior),
+      "odometry (makes the map metric) or gyro, of the bag; where the camera is on the robot is "
+      "read "
+      "from its /tf_static");
+  add("odometry-topic", text(&s->odometry_topic)->default_value("/odom"), "nav_msgs/Odometry");
+  add("imu-topic", text(&s->imu_topic)->default_value("/imu"), "sensor_msgs/Imu");
   add("config", text(&s->config), "yaml with settings, as config/tracker.yaml");
   add("set", po::value(&s->set)->composing(), "one setting, as in map/maximum_features=80");
   add("known-target", text(&s->known_target), "yaml with known points: the map becomes metric");
@@ -106,6 +114,7 @@ TrackerOptions trackerOptionsOf(const Settings& settings) {
     options.map.maximum_features = std::max(options.map.maximum_features, 2 * settings.features);
   }
   if (settings.localise) options.mapping = false;
+  if (!settings.motion_prior.empty()) options.motion.motion_prior = settings.motion_prior;
   for (const std::string& assignment : settings.set) setTrackerOption(assignment, &options);
   checkTrackerOptions(options);
   return options;
@@ -182,6 +191,14 @@ void printSummary(const RunSummary& s, const std::string& output) {
                 s.durations.back().p99_ms);
   if (s.frames_tracked > 0) std::printf("\nquality %.2f", s.quality);
   if (!s.quality_reason.empty()) std::printf(": %s", s.quality_reason.c_str());
+  if (s.frames_with_motion + s.frames_without_motion > 0) {
+    std::printf("\nmotion told in %d frames, taken for slip in %d", s.frames_with_motion,
+                s.frames_slipped);
+    if (s.frames_without_motion > 0)
+      std::printf(", missing in %d: %s", s.frames_without_motion, s.motion_fault.c_str());
+  }
+  if (s.scale_source == ScaleSource::kOdometry)
+    std::printf("\nscale by odometry, known to %.2f %%", 100.0 * s.scale_sigma);
   std::printf("\nwritten to %s\n", output.c_str());
 }
 
@@ -227,6 +244,9 @@ void run(const Settings& settings) {
   if (error) throw std::runtime_error(settings.output + ": " + error.message());
 
   Tracker tracker(camera, options);
+  tracker.setMotionHistory(
+      readBagMotion(bags, options.motion.hasGyro() ? settings.imu_topic : settings.odometry_topic,
+                    readBagImageFrame(bags, images.topic()), options.motion));
   if (!settings.mask.empty()) setMask(settings.mask, &tracker);
   if (!settings.map.empty()) tracker.loadMap(settings.map);
   std::unique_ptr<AnnotatedVideo> video;

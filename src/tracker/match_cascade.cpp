@@ -243,6 +243,12 @@ bool MatchCascade::isFalseAlarm(const FrameState& frame) const {
     matches.push_back(static_cast<int>(frame.search.matches(i).size()));
     if (result.match_of_feature[i] >= 0) accepted.push_back(i);
   }
+  // Where the motion was measured, nothing is left that matches could agree on: by chance they lie
+  // anywhere in the gates that there would be without.
+  if (frame.unmeasured_px.cols() > 0) {
+    const Eigen::MatrixXd S = frame.prior.S + frame.unmeasured_px * frame.unmeasured_px.transpose();
+    return logFalseAlarms(S, matches, accepted) > options_.maximum_log_false_alarms;
+  }
   return logFalseAlarms(frame.prior.S, matches, accepted) > options_.maximum_log_false_alarms;
 }
 

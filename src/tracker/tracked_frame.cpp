@@ -32,6 +32,8 @@ std::string scaleSourceName(ScaleSource source) {
       return "known_points";
     case ScaleSource::kService:
       return "service";
+    case ScaleSource::kOdometry:
+      return "odometry";
     case ScaleSource::kTag:
       return "tag";
     case ScaleSource::kChessboard:
@@ -66,6 +68,10 @@ std::unordered_map<FeatureId, double> predictedInformationBits(const TrackedFram
 /// The state of the tracker, of which every frame gives an account.
 void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->scale_source = scale_source_;
+  if (options_.motion.hasOdometry() && scale_source_ != ScaleSource::kFree)
+    frame->scale_sigma = filter_.scaleSigma();
+  if (motion_) frame->motion_source = options_.motion.motion_prior;
+  frame->motion_fault = motion_fault_;
   frame->camera = filter_.camera();
   frame->camera_covariance = filter_.cameraCovariance();
   frame->retired_total = map_.retiredTotal();

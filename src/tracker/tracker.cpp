@@ -79,6 +79,7 @@ void Tracker::Implementation::clearMap() {
   motion_noise_.reset();
   quality_.reset();
   scale_source_ = ScaleSource::kFree;
+  scale_finder_.reset();
   previous_image_.release();
   poor_frames_ = 0;
 }
@@ -103,9 +104,13 @@ void Tracker::Implementation::setScale(double factor) {
   if (!(factor > 0.0) || !std::isfinite(factor))
     throw std::invalid_argument("scale factor = " + std::to_string(factor) + " is not positive");
   if (!options_.mapping) throw std::runtime_error("mapping is false: the map stays as it is");
+  rescale(factor);
+  scale_source_ = ScaleSource::kService;
+}
+
+void Tracker::Implementation::rescale(double factor) {
   filter_.rescale(factor);
   rescaleBesideFilter(factor);
-  scale_source_ = ScaleSource::kService;
 }
 
 /// All that has lengths but the filter's state.
@@ -114,6 +119,7 @@ void Tracker::Implementation::rescaleBesideFilter(double factor) {
   map_.rescale(factor);
   initialiser_.rescale(factor);
   T_world_reference_.translation() *= factor;
+  scale_finder_.reset();
 }
 
 /// Refuses what can't be tracked, and says why.
@@ -163,6 +169,7 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   frame->timings_ms.update = stage.lap();
   if (is_restarted || giveUpWrongMap(current, frame)) return current;
   updateTrackingState(current);
+  findScale(frame);
   retakePatches(current);
   maintainMap(image, frame);
   followTarget(image, frame);
@@ -191,6 +198,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   const cv::Mat used = mask_.applyTo(image);
   frame->repeated_image = !previous_image_.empty() && isRepeatedImage(used, previous_image_);
   last_stamp_s_ = stamp_s;
+  motion_.reset();
+  motion_fault_.clear();
 
   std::optional<FrameState> current;
   if (state_ == TrackingState::kWaiting || state_ == TrackingState::kInitialising) {
@@ -198,8 +207,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     state_stamp_s_ = stamp_s;
   } else if (state_ == TrackingState::kLost) {
     const double interval_s = stamp_s - state_stamp_s_;
-    predict(interval_s);
     state_stamp_s_ = stamp_s;
+    predict(interval_s);
     if (!is_pose_given_ || !findNearGivenPose(used, interval_s, frame.get()))
       relocaliseWhileLost(used, frame.get());
   } else if (!frame->repeated_image) {
@@ -209,7 +218,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     frame->timings_ms.predict = stage.lap();
     // Over a long gap, or when too little has matched for a while, the prediction is next to
     // worthless: the whole image is searched for the map first.
-    const bool is_due = interval_s > options_.max_frame_interval_s ||
+    const bool is_due = (interval_s > options_.max_frame_interval_s && !isTranslationKnown()) ||
                         (poor_frames_ > 0 && poor_frames_ % kRelocalisationPeriodFrames == 0);
     if (!is_due || !relocalise(used, frame.get()))
       current.emplace(follow(used, interval_s, frame.get()));
@@ -236,6 +245,9 @@ std::shared_ptr<const TrackedFrame> Tracker::track(const cv::Mat& image, double 
   return implementation_->track(image, stamp_s, fault);
 }
 void Tracker::setMask(const cv::Mat& used) { implementation_->setMask(used); }
+void Tracker::setMotionHistory(std::shared_ptr<const MotionHistory> history) {
+  implementation_->setMotionHistory(std::move(history));
+}
 void Tracker::setPose(const Eigen::Isometry3d& T_world_camera,
                       const Eigen::Matrix<double, 6, 6>& covariance) {
   implementation_->setPose(T_world_camera, covariance);

@@ -15,6 +15,8 @@
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/tracker/frame_state.h"
 #include "active_matching_slam/tracker/match_cascade.h"
+#include "active_matching_slam/tracker/motion_history.h"
+#include "active_matching_slam/tracker/scale_finder.h"
 #include "active_matching_slam/tracker/tracker.h"
 #include "active_matching_slam/tracker/tracking_quality.h"
 #include "frame_noise.h"
@@ -44,6 +46,7 @@ class Tracker::Implementation {
         cascade_(options.matcher, options.cascade),
         relocaliser_(options.relocaliser, options.map, options.image) {
     checkTrackerOptions(options);
+    if (options.motion.hasGyro()) filter_.estimateGyroBias(options.motion.gyro_bias_sigma_rps);
   }
 
   std::shared_ptr<const TrackedFrame> track(const cv::Mat& image, double stamp_s,
@@ -54,6 +57,9 @@ class Tracker::Implementation {
   void saveMap(const std::string& path) const;
   void loadMap(const std::string& path);
   void setMask(const cv::Mat& used);
+  void setMotionHistory(std::shared_ptr<const MotionHistory> history) {
+    motion_history_ = std::move(history);
+  }
   void setPose(const Eigen::Isometry3d& T_world_camera,
                const Eigen::Matrix<double, 6, 6>& covariance);
 
@@ -67,6 +73,15 @@ class Tracker::Implementation {
   bool initialise(const FrameState& current, TrackedFrame* frame);
   FrameState follow(const cv::Mat& image, double interval_s, TrackedFrame* frame);
   void predict(double interval_s);
+  void measureMotion();
+  bool isMetric() const;
+  bool isTranslationKnown() const { return motion_ && motion_->velocity_start; }
+  bool isPoseKnown() const;
+  Eigen::Matrix<double, 6, 1> widestImpulse() const;
+  void learnMotion(const UpdateReport& report, const Accelerations& allowed, bool is_jerk);
+  bool areDepthsKnown() const;
+  void findScale(TrackedFrame* frame);
+  void rescale(double factor);
   FrameState measure(const cv::Mat& image, double interval_s) const;
   std::vector<VisibleFeature> visibleFeatures() const;
   void chooseCandidates(FrameState* current) const;
@@ -147,6 +162,15 @@ class Tracker::Implementation {
   Initialiser initialiser_;
   FeatureMap map_;
   MapMonitor map_monitor_;
+  std::shared_ptr<const MotionHistory> motion_history_;
+  /// Of the interval to the image in hand, as it was fused; the camera's displacement is left out
+  /// while the map is not metric, and kept for the scale.
+  std::optional<MotionMeasurement> motion_;
+  std::optional<UncertainVector> unscaled_velocity_;
+  MotionReport motion_report_;
+  std::string motion_fault_;
+  double predicted_interval_s_ = 0.0;
+  ScaleFinder scale_finder_;
   Target target_;
   MatchCascade cascade_;
   Relocaliser relocaliser_;

@@ -55,9 +55,26 @@ void Tracker::Implementation::updateTrackingState(const FrameState& current) {
   reason << matched << " of " << current.prior.size() << " features matched, "
          << options_.minimum_matches << " are needed";
   reason_ = reason.str();
-  if (poor_frames_ >= options_.lost_after_frames && state_ != TrackingState::kLost) {
+  if (poor_frames_ >= options_.lost_after_frames && state_ != TrackingState::kLost &&
+      !isPoseKnown())
     lose(reason_);
-  }
+}
+
+/// By odometry alone, where nothing matches: as well as a camera that was found anew, before its
+/// matches are fused.
+bool Tracker::Implementation::isPoseKnown() const {
+  if (!isTranslationKnown() || filter_.features().empty()) return false;
+  double distance = 0.0;
+  for (const FeatureState& feature : filter_.features())
+    distance += (homogeneousPosition(feature).head<3>() -
+                 homogeneousPosition(feature).w() * filter_.camera().position_world)
+                    .norm() /
+                std::max(homogeneousPosition(feature).w(), options_.filter.minimum_inverse_depth);
+  distance /= static_cast<double>(filter_.features().size());
+  const Eigen::Matrix<double, 12, 1> variance = filter_.cameraCovariance().diagonal();
+  const auto square = [](double x) { return x * x; };
+  return variance.head<3>().maxCoeff() < square(kRelocalisedSigmaPosition * distance) &&
+         variance.segment<3>(CameraError::kRotation).maxCoeff() < square(kRelocalisedSigmaRotation);
 }
 
 /// From here on no pose is claimed. The camera is taken to have stopped somewhere near.
@@ -113,6 +130,7 @@ void Tracker::Implementation::takeMap(LostMap stored) {
   map_ = std::move(stored.map);
   map_monitor_ = stored.monitor;
   scale_source_ = stored.scale_source;
+  scale_finder_.reset();
   motion_noise_.reset();
   structure_.clear();
   structure_snapshot_ = {};
@@ -252,7 +270,7 @@ void Tracker::Implementation::saveMap(const std::string& path) const {
   content.camera = camera_.calibration();
   content.camera_state = filter_.camera();
   content.features = filter_.features();
-  content.covariance = filter_.covariance();
+  content.covariance = filter_.savedCovariance();
   content.map = map_.features();
   content.next_id = filter_.nextId();
   content.scale_source = static_cast<int>(scale_source_);
@@ -277,6 +295,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   map_.clear();
   for (const MapFeature& feature : content.map) map_.add(feature);
   scale_source_ = static_cast<ScaleSource>(content.scale_source);
+  scale_finder_.reset();
   structure_.clear();
   structure_snapshot_ = {};
   lost_maps_.clear();

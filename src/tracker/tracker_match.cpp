@@ -18,12 +18,20 @@ constexpr double kVelocityDecay = 0.7;
 void Tracker::Implementation::predict(double interval_s) {
   if (poor_frames_ == 0) {
     T_world_reference_ = filter_.camera().poseWorldCamera();
-  } else {
-    filter_.decayVelocity(kVelocityDecay);
+  }
+  if (motion_history_) {
+    motion_ = motion_history_->between(state_stamp_s_ - interval_s, state_stamp_s_, &motion_fault_);
+    unscaled_velocity_.reset();
+    if (motion_ && !isMetric()) unscaled_velocity_.swap(motion_->velocity_start);
+  }
+  if (poor_frames_ > 0) {
+    if (!isTranslationKnown()) filter_.decayVelocity(kVelocityDecay);
     motion_noise_.reset();
   }
-  interval_s = std::min(interval_s, options_.max_frame_interval_s);
+  if (!motion_) interval_s = std::min(interval_s, options_.max_frame_interval_s);
+  predicted_interval_s_ = interval_s;
   filter_.predict(interval_s, motion_noise_.expected());
+  measureMotion();
   noise_.predict(camera_, interval_s, options_.mapping ? &filter_ : nullptr);
 }
 
@@ -67,11 +75,18 @@ void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   prior.z = std::move(predicted.z);
   prior.S = std::move(predicted.S);
   prior.noise_variance_px2 = sigma_px * sigma_px;
+  const auto impulse = motion_ ? filter_.impulse() : std::nullopt;
   const Eigen::Matrix<double, 6, 1> jerk =
-      impulseVariance(motion_noise_.widest(), current->predicted_interval_s) -
-      impulseVariance(motion_noise_.expected(), current->predicted_interval_s);
+      widestImpulse() -
+      impulse.value_or(impulseVariance(motion_noise_.expected(), current->predicted_interval_s));
   current->jerk_px = predicted.impulse_px * jerk.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   current->jerk_probability = motion_noise_.jerkProbability();
+  if (impulse) {
+    const Eigen::Matrix<double, 6, 1> unmeasured =
+        impulseVariance(motion_noise_.widest(), current->predicted_interval_s) - *impulse;
+    current->unmeasured_px =
+        predicted.impulse_px * unmeasured.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < ids.size() && kept < prior.ids.size(); ++i) {
     if (ids[i] != prior.ids[kept]) continue;
@@ -88,7 +103,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
   current.image = image;
   current.mask = mask_;
   current.interval_s = interval_s;
-  current.predicted_interval_s = std::min(interval_s, options_.max_frame_interval_s);
+  current.predicted_interval_s = predicted_interval_s_;
   current.poor_frames = poor_frames_;
   current.depths_vague = initialiser_.areDepthsGuessed();
   current.reference_image = reference_image_;
@@ -121,7 +136,7 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   Accelerations allowed = motion_noise_.expected();
   if (current->is_jerk) {
     allowed = motion_noise_.widest();
-    filter_.replaceAccelerations(allowed);
+    filter_.replaceImpulse(widestImpulse());
   }
   // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
   const bool are_depths_guessed = initialiser_.areDepthsGuessed();
@@ -131,7 +146,7 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   frame->nis_degrees = 2 * report.used;
 
   motion_noise_.countImage(current->is_jerk);
-  if (!are_depths_guessed) motion_noise_.learn(report, allowed, current->predicted_interval_s);
+  if (!are_depths_guessed) learnMotion(report, allowed, current->is_jerk);
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
   if (options_.mapping) learnSlopes(*current);
   recordSearches(*current, frame->index);

@@ -84,6 +84,7 @@ void checkTrackerOptions(const TrackerOptions& options) {
   checkChoice("matcher", options.matcher, matcherNames());
   checkImageOptions(options.image);
   checkMapOptions(options.map);
+  checkMotionOptions(options.motion);
   checkTarget(options.target);
   if (!options.known_points.empty() && options.known_points.size() < kFewestKnownPoints)
     throw std::invalid_argument("known points: " + std::to_string(options.known_points.size()) +

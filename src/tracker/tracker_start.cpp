@@ -51,6 +51,7 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
         Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
     filter_.reset(CameraState(), sigma.array().square().matrix().asDiagonal());
     scale_source_ = ScaleSource::kFree;
+    scale_finder_.reset();
   }
   // Pose and covariance are relative to this image: it gives all the corners that it has, of which
   // each detection finds one a cell.

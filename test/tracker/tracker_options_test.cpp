@@ -36,7 +36,9 @@ struct OtherValue {
   Table* table;
   void operator()(const OptionField& f, bool value) { (*table)[f.name] = textOf(!value); }
   void operator()(const OptionField& f, UpdateRule) { (*table)[f.name] = "thesis"; }
-  void operator()(const OptionField& f, const std::string&) { (*table)[f.name] = "jcbb"; }
+  void operator()(const OptionField& f, const std::string&) {
+    (*table)[f.name] = f.name == std::string("motion_prior") ? "gyro" : "jcbb";
+  }
   template <class T>
   void operator()(const OptionField& f, T value, T minimum, T maximum) {
     T other;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "active_matching_slam/evaluation/trajectory.h"
 #include "active_matching_slam/tracker/tracked_frame.h"
@@ -17,6 +18,8 @@ struct FrameRecord {
   bool repeated_image = false;
   bool ignored_image = false;  ///< late, broken or of another size: nothing was made of it
   ScaleSource scale_source = ScaleSource::kFree;
+  double scale_sigma = 0.0, rescaled_by = 1.0;  ///< as in TrackedFrame
+  std::string motion_source, motion_fault;
   StampedPose pose;    ///< a claim only when the state is kTracking
   double speed = 0.0;  ///< [m/s]
   Eigen::Matrix<double, 6, 6> pose_covariance = Eigen::Matrix<double, 6, 6>::Zero();
@@ -40,5 +43,9 @@ struct FrameRecord {
 };
 
 FrameRecord recordOf(const TrackedFrame& frame);
+
+/// The records of a map whose lengths were multiplied by `factor`, known to a relative
+/// `scale_sigma`: as if they always had been.
+void rescaleRecords(double factor, double scale_sigma, int map, std::vector<FrameRecord>* records);
 
 }  // namespace active_matching_slam

@@ -42,14 +42,19 @@ struct RunSummary {
   std::string last_reason;  ///< of the last frame that has one: why its state is what it is
   std::string matcher;
   ScaleSource scale_source = ScaleSource::kFree;  ///< at the end
-  double duration_s = 0.0;                        ///< from first to last stamp
+  double scale_sigma = 0.0;  ///< relative, of lengths as a whole at the end; 0: not known
+  /// Frames whose motion odometry or gyro told of, and those of these in which it was taken for
+  /// slip; frames in which it was missing, or wrong, and what was wrong most often.
+  int frames_with_motion = 0, frames_slipped = 0, frames_without_motion = 0;
+  std::string motion_fault;
+  double duration_s = 0.0;  ///< from first to last stamp
 
-  int maps = 0;              ///< in which the camera was tracked
-  int main_map = 0;          ///< that of most tracked frames: errors are of the poses in it
+  int maps = 0;      ///< in which the camera was tracked
+  int main_map = 0;  ///< that of most tracked frames: errors are of the poses in it
   int frames_in_main_map = 0;
-  double quality = 1.0;         ///< median over the tracked frames
-  std::string quality_reason;   ///< the most frequent cause of a low one
-  int truth_pairs = 0;  ///< tracked frames with a true pose
+  double quality = 1.0;        ///< median over the tracked frames
+  std::string quality_reason;  ///< the most frequent cause of a low one
+  int truth_pairs = 0;         ///< tracked frames with a true pose
   std::optional<double> ate_sim3_m, ate_se3_m, sim3_scale;
   std::optional<RelativePoseError> rpe;  ///< over 1 s; scaled as Sim(3) where the scale is free
   std::optional<double> nees_mean;       ///< of the 6-D pose over the frames

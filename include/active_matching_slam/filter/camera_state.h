@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 
 #include "active_matching_slam/camera/camera_model.h"
 
@@ -18,6 +19,8 @@ struct CameraState {
   /// row. 0 for a global shutter, negative when read from below.
   double readout_s = 0.0;
   LensCorrection lens;
+  /// Of a gyroscope, in the camera frame [rad/s]; part of the state only where there is one.
+  std::optional<Eigen::Vector3d> gyro_bias_rps;
 
   /// Camera points into the world.
   Eigen::Isometry3d poseWorldCamera() const {
@@ -34,12 +37,18 @@ struct CameraState {
 
 /// Order of the camera's error state in every covariance: additive position, rotation as a
 /// world-frame rotation vector (R_true = exp([rotation]x) R_mean), additive velocity, additive
-/// angular velocity; then, additive, readout and lens.
+/// angular velocity; then, additive, readout and lens, and the gyroscope's bias where the state has
+/// one.
 struct CameraError {
   static constexpr int kPosition = 0, kRotation = 3, kVelocity = 6, kAngularVelocity = 9,
                        kMotionSize = 12, kReadout = 12, kFocal = 13, kRadial = 14, kCentre = 15,
-                       kSize = 17, kCalibrationSize = kSize - kMotionSize;
+                       kSize = 17, kCalibrationSize = kSize - kMotionSize, kGyroBias = kSize;
 };
+
+/// Rows of the camera's error: those of the features follow.
+inline int cameraErrorSize(const CameraState& camera) {
+  return CameraError::kSize + (camera.gyro_bias_rps ? 3 : 0);
+}
 
 /// Covariance of the motion alone, in the order of CameraError.
 using MotionCovariance = Eigen::Matrix<double, CameraError::kMotionSize, CameraError::kMotionSize>;

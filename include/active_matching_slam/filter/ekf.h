@@ -12,6 +12,7 @@
 #include "active_matching_slam/filter/covariance_matrix.h"
 #include "active_matching_slam/filter/feature_state.h"
 #include "active_matching_slam/filter/filter_options.h"
+#include "active_matching_slam/filter/motion_measurement.h"
 
 namespace active_matching_slam {
 
@@ -74,6 +75,22 @@ struct UpdateReport {
   ImpulseEstimate linear, angular;  ///< of the last predict()
 };
 
+/// What a measurement of the motion, of three components, made of the state.
+struct MotionFusion {
+  double nis = 0.0;  ///< before inflation; three degrees of freedom
+  /// By which its covariance was taken times so much, as it lay outside of what is possible.
+  double inflation = 1.0;
+  double innovation = 0.0;        ///< length of the innovation, in the measurement's unit
+  double innovation_sigma = 0.0;  ///< what was expected of it, root mean square
+  ImpulseEstimate impulse;        ///< of the last predict(), linear or angular
+};
+
+struct MotionReport {
+  MotionFusion rotation;
+  std::optional<MotionFusion> translation;
+  bool healthy = true;  ///< as UpdateReport::healthy
+};
+
 /// Variance per axis [(m/s)^2, (rad/s)^2] of the impulses of accelerations over an interval.
 Eigen::Matrix<double, 6, 1> impulseVariance(const Accelerations& sigmas, double interval_s);
 
@@ -112,6 +129,19 @@ class Ekf {
   /// The state as if the last predict() had been given these accelerations; nothing when the state
   /// has changed otherwise since.
   void replaceAccelerations(const Accelerations& sigmas);
+
+  /// From now on the state holds the bias of a gyroscope, in every map. On an empty map.
+  void estimateGyroBias(double initial_sigma_rps);
+  /// Corrects the state by what is known of the motion of the last predict(), of which the impulse
+  /// is then known better. A measurement that lies farther off than chance explains (slip) counts
+  /// with a covariance inflated until it does not (Chang 2014). Nothing when the state has changed
+  /// otherwise since. Lengths must be metric where the measurement has any.
+  MotionReport measureMotion(const MotionMeasurement& motion, Corrected corrected);
+  /// Variance of the impulse of the last predict() as replaceImpulse() takes it, measureMotion()
+  /// included; none when the state has changed otherwise since.
+  std::optional<Eigen::Matrix<double, 6, 1>> impulse() const;
+  /// As replaceAccelerations(), by variances.
+  void replaceImpulse(const Eigen::Matrix<double, 6, 1>& variance);
 
   /// Landmark process noise: where a corner lies in its patch depends on the view of it. As that
   /// turned in the last `interval_s`, each landmark moved across its ray from the camera by a
@@ -160,6 +190,12 @@ class Ekf {
   /// that any value far below the errors of lengths, of some 1e-2, and far above rounding will do.
   static constexpr double kFreeScaleSigma = 2e-4;
 
+  /// Lengths as a whole are known to `relative_sigma` only: opens the gauge of scale by so much.
+  void loosenScale(double relative_sigma);
+  /// Relative standard deviation of lengths as a whole: of the mean logarithm of the features'
+  /// distances. 0 without features.
+  double scaleSigma() const;
+
   /// Multiplies all lengths (map, position, velocity and their covariances) by `factor` > 0.
   void rescale(double factor);
 
@@ -167,6 +203,8 @@ class Ekf {
   const std::vector<FeatureState>& features() const { return features_; }
   const FeatureState* find(FeatureId id) const;  ///< null when unknown
   FeatureId nextId() const { return next_id_; }  ///< of the next feature that is added
+  /// covariance() as restore() takes it: without the gyroscope's bias.
+  Eigen::MatrixXd savedCovariance() const;
   /// Symmetric, camera first, then every feature at its offset. A view: copy it to keep it.
   CovarianceMatrix::ConstView covariance() const { return covariance_.view(); }
   int stateSize() const { return covariance_.size(); }
@@ -194,6 +232,10 @@ class Ekf {
                          Eigen::Ref<Eigen::MatrixXd> X);
   /// P <- P - X X^T + D, but for the map's own block.
   bool correctCameraCovariance(const MotionCovariance& added, const Eigen::MatrixXd& X);
+  MotionFusion fuseMotion(const Eigen::Matrix<double, 3, Eigen::Dynamic>& H,
+                          const Eigen::Vector3d& innovation, const Eigen::Matrix3d& noise,
+                          int impulse_row, Corrected corrected, bool* healthy);
+  void applyMotion(const Eigen::VectorXd& delta);
   bool repairVariances(const Eigen::VectorXd& before);
 
   /// Of the last prediction: unknown velocities of `variance` (linear, angular) moved the camera's
@@ -202,6 +244,7 @@ class Ekf {
     double interval_s;
     Eigen::Matrix<double, CameraError::kMotionSize, 6> G;
     Eigen::Matrix<double, 6, 1> variance;
+    Eigen::Quaterniond q_start;  ///< the camera's, where the interval began
   };
 
   FilterOptions options_;
@@ -209,6 +252,7 @@ class Ekf {
   std::vector<FeatureState> features_;  ///< ascending ids and offsets
   CovarianceMatrix covariance_;
   std::optional<Impulse> impulse_;  ///< none when the state is no longer as predict() left it
+  double initial_sigma_gyro_bias_rps_ = 0.0;
   FeatureId next_id_ = 0;
   std::vector<double> workspace_;  ///< of the update; kept to save allocations
 };

@@ -13,7 +13,7 @@ namespace active_matching_slam {
 /// of SO(3): R <- exp(theta) R; positions and velocities p <- p + J d, the exponential of SE_k(3)
 /// (Barrau & Bonnabel 2015), so that a common motion of camera and map is followed exactly; a
 /// bearing turns by exp(m x B d + m (m . theta)), for the same reason; angular velocity, inverse
-/// depth, readout and lens add.
+/// depth, readout, lens and a gyroscope's bias add.
 void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& camera,
                 std::vector<FeatureState>& features);
 

@@ -33,6 +33,8 @@ class NodeDiagnostics {
   /// `latency_s`: from the image's stamp, by ROS time; `turnaround_s`: from its arrival to the last
   /// message published, by real time.
   void record(const TrackedFrame& frame, double latency_s, double turnaround_s);
+  /// Of the topic of odometry or IMU: what is wrong with it, and whether it was used all the same.
+  void recordMotion(const std::string& topic, const std::string& fault, bool is_used);
   /// An image that could not be used, and why.
   void recordFault(const std::string& fault);
 
@@ -58,6 +60,9 @@ class NodeDiagnostics {
   TrackingState state_ = TrackingState::kWaiting;
   std::string reason_ = "no image yet";
   ScaleSource scale_source_ = ScaleSource::kFree;
+  double scale_sigma_ = 0.0;
+  std::string motion_topic_, motion_fault_;
+  int motion_frames_ = 0, motion_used_ = 0;  ///< in the interval
   std::size_t features_ = 0;
   int candidates_ = 0, matched_ = 0, resets_ = 0, times_lost_ = 0;
   int map_ = 0;

@@ -14,6 +14,7 @@
 #include "active_matching_slam/ros/frame_worker.h"
 #include "active_matching_slam/ros/masked_images.h"
 #include "active_matching_slam/ros/messages.h"
+#include "active_matching_slam/ros/motion_subscription.h"
 #include "active_matching_slam/ros/node_diagnostics.h"
 #include "active_matching_slam/ros/node_options.h"
 #include "active_matching_slam/ros/pose_broadcaster.h"
@@ -34,11 +35,10 @@ NodeSettings readNodeSettings(const ros::NodeHandle& private_node);
 
 /// The tracker as a member of a ROS graph: what node and nodelet share.
 ///
-/// Subscribes to `image` (image_transport) and the camera_info beside it, `initialpose` and ~mask;
-/// publishes what
-/// FramePublisher, PoseBroadcaster, NodeDiagnostics and ReconfigureServer say; serves ~reset,
-/// ~save_map, ~load_map, ~save_trajectory, ~set_scale, ~set_matcher. Parameters: option_field.h
-/// and node_options.h.
+/// Subscribes to `image` (image_transport) and the camera_info beside it, `initialpose` and ~mask,
+/// and, as motion_prior says, to `odometry` or `imu`; publishes what FramePublisher,
+/// PoseBroadcaster, NodeDiagnostics and ReconfigureServer say; serves ~reset, ~save_map, ~load_map,
+/// ~save_trajectory, ~set_scale, ~set_matcher. Parameters: option_field.h and node_options.h.
 ///
 /// Callbacks must come one at a time; tracking runs in a thread of its own, on the newest image.
 class TrackerRos {
@@ -53,6 +53,7 @@ class TrackerRos {
   void track(const CameraImage& image);
   void publish(const TrackedFrame& frame, const CameraImage& image);
   void noticeChanges(const TrackedFrame& frame, const ros::Time& stamp);
+  void noticeMotion(const TrackedFrame& frame);
   void forgetPast(bool time_jumped);
   std::string cameraFrame(const std_msgs::Header& header) const;
 
@@ -94,6 +95,9 @@ class TrackerRos {
 
   std::unique_ptr<FrameWorker<CameraImage>> worker_;
   std::unique_ptr<MaskedImages> masked_images_;
+  std::unique_ptr<MotionSubscription> motion_;
+  bool is_motion_told_ = true;  ///< nothing was said yet of its being missing
+  RepeatedWarning slip_warning_;
   std::unique_ptr<CameraSubscription> subscription_;
   ros::Subscriber mask_, initial_pose_;
   std::unique_ptr<ReconfigureServer> reconfigure_;

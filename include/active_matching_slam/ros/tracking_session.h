@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "active_matching_slam/camera/camera_calibration.h"
 #include "active_matching_slam/ros/camera_subscription.h"
@@ -26,6 +27,12 @@ class TrackingSession {
   void setMask(const cv::Mat& used) { first_mask_ = used; }
   /// A map file that the first tracker begins with.
   void setFirstMap(const std::string& path) { first_map_ = path; }
+
+  /// Where the trackers look up the motion between images; see Tracker::setMotionHistory().
+  void setMotionHistory(std::shared_ptr<const MotionHistory> history) {
+    motion_history_ = std::move(history);
+    if (tracker_) tracker_->setMotionHistory(motion_history_);
+  }
 
   /// Null when the image can't be given to a tracker; fault() then says why.
   std::shared_ptr<const TrackedFrame> process(const CameraImage& image);
@@ -65,6 +72,7 @@ class TrackingSession {
   std::string fault_;
   OneCamera cameras_;
   cv::Mat first_mask_;
+  std::shared_ptr<const MotionHistory> motion_history_;
   sensor_msgs::ImageConstPtr mask_;
   std::string mask_fault_, first_map_;
   RepeatedWarning warning_;

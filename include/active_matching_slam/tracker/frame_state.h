@@ -42,6 +42,9 @@ struct FrameState {
   /// this times its transpose.
   Eigen::MatrixXd jerk_px;
   double jerk_probability = 0.0;
+  /// The same of what the prior would have been without a measurement of the motion (odometry,
+  /// gyroscope); without columns where there was none.
+  Eigen::MatrixXd unmeasured_px;
   /// The last image with enough matches, whose camera is known. Empty when there is none.
   cv::Mat reference_image;
 

@@ -30,6 +30,7 @@ enum class ScaleSource {
   kKnownTarget = 1,
   kKnownPoints = 2,
   kService = 3,
+  kOdometry = 4,
   kTag = 5,
   kChessboard = 6
 };
@@ -81,6 +82,15 @@ struct TrackedFrame {
   std::string reason;           ///< why the state is what it is; empty while all is well
   bool repeated_image = false;  ///< identical to the one before: no new information was fused
   ScaleSource scale_source = ScaleSource::kFree;
+
+  /// Relative standard deviation of lengths as a whole; 0: not known, or scale is free.
+  double scale_sigma = 0.0;
+  /// By what all lengths of the map were multiplied in this frame, as its scale became known: those
+  /// of frames before it count times so much.
+  double rescaled_by = 1.0;
+  /// What besides the images has told of the motion since the last one: odometry, gyro or nothing;
+  /// and what was wrong with it, empty: nothing.
+  std::string motion_source, motion_fault;
 
   CameraState camera;
   /// 12 x 12, CameraError order (world-frame additive position, world-frame rotation vector, ...).

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "active_matching_slam/camera/camera_model.h"
+#include "active_matching_slam/tracker/motion_history.h"
 #include "active_matching_slam/tracker/tracked_frame.h"
 #include "active_matching_slam/tracker/tracker_options.h"
 
@@ -27,6 +28,9 @@ class Tracker {
   /// Which part of the images from the next one on shows the scene: 8-bit grey of the camera's
   /// size, white is used. Empty: all. Throws std::invalid_argument naming what is wrong with it.
   void setMask(const cv::Mat& used);
+
+  /// Where the motion between images is looked up, as TrackerOptions::motion says; null: nowhere.
+  void setMotionHistory(std::shared_ptr<const MotionHistory> history);
 
   /// Empties the map, and the next image starts anew; without mapping looks for the camera anew.
   void reset(const std::string& reason);
