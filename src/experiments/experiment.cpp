@@ -20,6 +20,8 @@ const std::vector<Experiment>& experiments() {
   static const std::vector<Experiment> list = {
       {{"fig_4_2", "figures 4.2, 4.3: an object pinned down by MI, and by MI per pixel"},
        runPinDown},
+      {{"fig_4_4", "figure 4.4: information about the other features, and about the camera"},
+       runInformationMeasures},
       {{"fig_5_3", "figure 5.3: search of a line, pixel by pixel, with a histogram"},
        runHistogramSearch},
       {{"table_5_2", "table 5.2: one tracking step with 11 features, JCBB and AM"},

@@ -71,6 +71,7 @@ inline Finding::Verdict verdict(bool agrees) {
 
 // The experiments.
 ExperimentResult runPinDown(Workbench& bench);
+ExperimentResult runInformationMeasures(Workbench& bench);
 ExperimentResult runHistogramSearch(Workbench& bench);
 ExperimentResult runTrackingStep(Workbench& bench);
 ExperimentResult runFeaturesAndRate(Workbench& bench);

@@ -111,6 +111,7 @@ class Tracker::Implementation {
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
+  std::vector<FeatureId> leastInformative(int count) const;
   void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);

@@ -28,6 +28,9 @@ struct MapFeature {
   /// Innovation less the frame's median, averaged over about the last ten matches [px].
   Eigen::Vector2d drift_px = Eigen::Vector2d::Zero();
   LandmarkNoise noise;  ///< of its matches
+  /// What its match tells of the camera [bit], averaged over the last seconds; 0 in a frame in
+  /// which it is not visible. Negative: not known yet.
+  double information_bits = -1.0;
   std::int64_t first_frame = 0;
   std::int64_t last_matched_frame = 0;
 };
@@ -100,6 +103,15 @@ class FeatureMap {
   /// Features that are no points of the scene, such as corners where something near hides something
   /// far: their matches leave the prediction always to one side, by far more than others do.
   std::vector<FeatureId> drifting() const;
+
+  /// Averages what the features that should be visible tell of the camera, `bits` of each, expected
+  /// in a frame `interval_s` after the last. The others tell nothing.
+  void recordInformation(const std::vector<VisibleFeature>& visible,
+                         const std::vector<double>& bits, double interval_s);
+
+  /// The `count` features of least MapFeature::information_bits. Never a known one, nor one of
+  /// which they are not known yet.
+  std::vector<FeatureId> leastInformative(int count) const;
 
   /// The `count` features of least use to the camera where it is: with the largest sum of the angle
   /// off the optical axis [rad], of the baseline from the first view over the distance (for a short
