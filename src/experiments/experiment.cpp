@@ -31,6 +31,8 @@ const std::vector<Experiment>& experiments() {
       {{"fig_5_14", "figures 5.14, 5.15: information by matching step"}, runInformationSteps},
       {{"table_6_1", "table 6.1, figures 6.13, 6.14: information that submaps preserve"},
        runSubmaps},
+      {{"fig_6_10", "figures 6.10, 6.11: submaps that come apart, and those of a larger place"},
+       runSubmapsOverTime},
       {{"fig_7_2", "figures 7.2, 7.3: FAM and JCBB by number of features and frame rate"},
        runFastMatching},
       {{"table_7_1", "figures 7.7, 7.8, table 7.1: pixels and time of CLAM, to 400 features"},

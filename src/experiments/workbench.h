@@ -77,6 +77,7 @@ ExperimentResult runTrackingStep(Workbench& bench);
 ExperimentResult runFeaturesAndRate(Workbench& bench);
 ExperimentResult runInformationSteps(Workbench& bench);
 ExperimentResult runSubmaps(Workbench& bench);
+ExperimentResult runSubmapsOverTime(Workbench& bench);
 ExperimentResult runFastMatching(Workbench& bench);
 ExperimentResult runScalableMatching(Workbench& bench);
 ExperimentResult runTrajectories(Workbench& bench);
