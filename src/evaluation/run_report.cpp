@@ -100,7 +100,7 @@ void addMatchingColumns(std::vector<Column>* columns) {
       column("information_start_bits", &MatchStatistics::information_bits_start),
       column("information_end_bits", &MatchStatistics::information_bits_end),
       column("camera_bits", &FrameRecord::camera_bits),
-      column("camera_bits_left", &FrameRecord::camera_bits_left),
+      column("state_bits_left", &FrameRecord::state_bits_left),
       column("camera_bits_per_ms", &FrameRecord::camera_bits_per_ms),
       column("tree_divergence_bits", &FrameRecord::tree_divergence_bits),
       column("ambiguous", &MatchStatistics::ambiguous),

@@ -106,7 +106,7 @@ ExperimentResult runSubmapsOverTime(Workbench& bench) {
     sides.points.emplace_back(moment.frame, agreement);
   });
   if (sides.points.size() > 1) {
-    const double first = sides.points.front().second, last = sides.points.back().second;
+    const double first = sides.points.front().y(), last = sides.points.back().y();
     chart.series.push_back(sides);
     result.findings.push_back(
         {"corridor: features on the side of their submap, at first and in the end",

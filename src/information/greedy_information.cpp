@@ -17,7 +17,7 @@ Eigen::Matrix2d innovationCovariance(const InformativeMeasurement& m, const Cova
 
 double expectedBits(const InformativeMeasurement& m, const Covariance& P) {
   const double determinant = innovationCovariance(m, P).determinant();
-  return m.probability * 0.5 * std::log2(std::max(determinant, 1.0));
+  return m.probability * (0.5 * std::log2(std::max(determinant, 1.0)) + m.own_bits);
 }
 
 /// A measurement in the queue, with a bound of what it brings.
@@ -35,7 +35,7 @@ struct Entry {
 }  // namespace
 
 double informationBits(const InformativeMeasurement& measurement) {
-  return expectedBits({measurement.W, 1.0, 1.0}, Covariance::Identity());
+  return expectedBits({measurement.W, 0.0, 1.0, 1.0}, Covariance::Identity());
 }
 
 GreedyChoice chooseByInformation(const std::vector<InformativeMeasurement>& measurements,

@@ -206,10 +206,13 @@ std::vector<FeatureId> FeatureMap::drifting() const {
 }
 
 void FeatureMap::recordInformation(const std::vector<VisibleFeature>& visible,
-                                   const std::vector<double>& bits, double interval_s) {
+                                   const std::vector<double>& bits,
+                                   const std::vector<FeatureId>& behind_mask, double interval_s) {
   const double kept = std::exp(-std::max(interval_s, 0.0) / kInformationMemory_s);
   std::size_t next = 0;
   for (MapFeature& feature : features_) {
+    feature.behind_mask = std::binary_search(behind_mask.begin(), behind_mask.end(), feature.id);
+    if (feature.behind_mask) continue;
     const bool is_visible = next < visible.size() && visible[next].id == feature.id;
     const double now = is_visible ? bits[next++] : 0.0;
     const bool is_known = feature.information_bits >= 0.0;
@@ -221,7 +224,8 @@ void FeatureMap::recordInformation(const std::vector<VisibleFeature>& visible,
 std::vector<FeatureId> FeatureMap::leastInformative(int count) const {
   std::vector<const MapFeature*> candidates;
   for (const MapFeature& feature : features_)
-    if (!feature.known && feature.information_bits >= 0.0) candidates.push_back(&feature);
+    if (!feature.known && !feature.behind_mask && feature.information_bits >= 0.0)
+      candidates.push_back(&feature);
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const MapFeature* a, const MapFeature* b) {
                      return a->information_bits < b->information_bits;

@@ -114,7 +114,7 @@ ams_msgs::MatchingStatistics toStatisticsMsg(const TrackedFrame& frame,
   message.information_bits_start = finiteOrZero(matching.information_bits_start);
   message.information_bits_left = finiteOrZero(matching.information_bits_end);
   message.camera_bits = finiteOrZero(frame.camera_bits);
-  message.camera_bits_left = finiteOrZero(frame.camera_bits_left);
+  message.state_bits_left = finiteOrZero(frame.state_bits_left);
   message.camera_bits_per_ms = finiteOrZero(cameraBitsPerMillisecond(frame));
   message.tree_divergence_bits = finiteOrZero(treeDivergenceBits(frame));
   message.nis = finiteOrZero(frame.nis);

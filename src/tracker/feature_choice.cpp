@@ -11,13 +11,6 @@
 #include "active_matching_slam/matching/match_options.h"
 
 namespace active_matching_slam {
-namespace {
-
-/// One place of so many goes to the features that gain most themselves. Cost: with fewer, depths
-/// take longer to be known; with more, the camera is measured by less.
-constexpr int kPlacesPerOwn = 4;
-
-}  // namespace
 
 FeatureChoice chooseFeatures(const Ekf& filter, const CameraModel& camera, const FeatureMap& map,
                              const FrameNoise& noise, const std::vector<VisibleFeature>& visible,
@@ -37,8 +30,8 @@ FeatureChoice chooseFeatures(const Ekf& filter, const CameraModel& camera, const
   for (std::size_t i = 0; i < visible.size(); ++i) {
     if (!measurements[i]) continue;
     const double probability = map.find(ids[i])->recent_rate;
-    worth.push_back(
-        {measurements[i]->W, probability, modelledSearch_ms(measurements[i]->gate_area_px2)});
+    worth.push_back({measurements[i]->W, measurements[i]->own_bits, probability,
+                     modelledSearch_ms(measurements[i]->gate_area_px2)});
     index_of.push_back(i);
     const double bits = informationBits(worth.back());
     choice.bits_of_visible[i] = probability * bits;
@@ -52,23 +45,10 @@ FeatureChoice chooseFeatures(const Ekf& filter, const CameraModel& camera, const
 
   std::vector<char> is_chosen(visible.size(), 0);
   for (std::size_t i = 0; i < visible.size(); ++i) is_chosen[i] = map.find(ids[i])->known ? 1 : 0;
-  const int own_places = options.most / kPlacesPerOwn;
-  const GreedyChoice of_camera =
-      chooseByInformation(worth, {options.most - own_places, kFloorSearches, options.stop_bits});
-  choice.bits_left = of_camera.bits_left;
-  for (const int k : of_camera.order) is_chosen[index_of[static_cast<std::size_t>(k)]] = 1;
-
-  std::vector<std::pair<double, std::size_t>> own;  // bits, index in `visible`
-  for (std::size_t k = 0; k < worth.size(); ++k) {
-    const std::size_t i = index_of[k];
-    const double bits = worth[k].probability * measurements[i]->own_bits;
-    if (!is_chosen[i] && bits >= options.stop_bits) own.emplace_back(-bits, i);
-  }
-  std::sort(own.begin(), own.end());
-  // A quarter of all that are chosen.
-  const std::size_t share = of_camera.order.size() / (kPlacesPerOwn - 1);
-  const std::size_t wanted = std::min(own.size(), std::max<std::size_t>(share, 1));
-  for (std::size_t k = 0; k < wanted; ++k) is_chosen[own[k].second] = 1;
+  const GreedyChoice most_informative =
+      chooseByInformation(worth, {options.most, kFloorSearches, options.stop_bits});
+  choice.bits_left = most_informative.bits_left;
+  for (const int k : most_informative.order) is_chosen[index_of[static_cast<std::size_t>(k)]] = 1;
   for (std::size_t i = 0; i < visible.size(); ++i)
     if (is_chosen[i]) choice.chosen.push_back(visible[i]);
   return choice;

@@ -23,11 +23,10 @@ struct FeatureChoice {
   double bits_left = 0.0;  ///< what the best one that was left would tell, given the chosen
 };
 
-/// Which of the visible features are measured in a frame: those that tell most of the camera for
-/// the time that their searches take, one by one given those before (chooseByInformation()), until
-/// the next would tell too little. A quarter of the places is kept for those whose own position
-/// would gain most by it, which is what the camera will be measured by later. Known features always
-/// come along.
+/// Which of the visible features are measured in a frame: those that tell most of the state (camera
+/// and features; Chli 2009, eq. 4.28) for the time that their searches take, one by one given those
+/// before (chooseByInformation()), until the next would tell too little. Known features always come
+/// along.
 FeatureChoice chooseFeatures(const Ekf& filter, const CameraModel& camera, const FeatureMap& map,
                              const FrameNoise& noise, const std::vector<VisibleFeature>& visible,
                              const FeatureChoiceOptions& options);

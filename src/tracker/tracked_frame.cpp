@@ -137,7 +137,7 @@ void Tracker::Implementation::describeState(TrackedFrame* frame) const {
 /// What was predicted, searched and matched. After describeState().
 void Tracker::Implementation::describeMatches(FrameState current, TrackedFrame* frame) {
   frame->matching = std::move(current.matching);
-  frame->camera_bits_left = current.bits_left;
+  frame->state_bits_left = current.bits_left;
   for (std::size_t i = 0; i < current.visible.size(); ++i) {
     TrackedFeature* feature = findFeature(current.visible[i].id, frame);
     if (!feature) continue;

@@ -83,7 +83,7 @@ class Tracker::Implementation {
   void findScale(TrackedFrame* frame);
   void rescale(double factor);
   FrameState measure(const cv::Mat& image, double interval_s) const;
-  std::vector<VisibleFeature> visibleFeatures() const;
+  std::vector<VisibleFeature> visibleFeatures(std::vector<FeatureId>* behind_mask = nullptr) const;
   void chooseCandidates(FrameState* current) const;
   void predictMeasurements(FrameState* current) const;
   void correct(FrameState* current, TrackedFrame* frame);

@@ -49,11 +49,15 @@ void Tracker::Implementation::predict(double interval_s) {
 }
 
 /// Features that should be seen in the part of the image that is used.
-std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures() const {
+/// `behind_mask`: also those in the other part, ascending; null: not asked for.
+std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures(
+    std::vector<FeatureId>* behind_mask) const {
   std::vector<VisibleFeature> visible =
       map_.visible(filter_, camera_, options_.map, options_.image.border_px);
-  const auto is_masked = [this](const VisibleFeature& feature) {
-    return !mask_.isSearched(feature.view.pixel);
+  const auto is_masked = [&](const VisibleFeature& feature) {
+    const bool is_behind = !mask_.isSearched(feature.view.pixel);
+    if (is_behind && behind_mask) behind_mask->push_back(feature.id);
+    return is_behind;
   };
   visible.erase(std::remove_if(visible.begin(), visible.end(), is_masked), visible.end());
   return visible;
@@ -61,7 +65,7 @@ std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures() const {
 
 /// Features that should be seen and the templates to search them by.
 void Tracker::Implementation::chooseCandidates(FrameState* current) const {
-  current->visible = visibleFeatures();
+  current->visible = visibleFeatures(&current->behind_mask);
   FeatureChoice choice =
       chooseFeatures(filter_, camera_, map_, noise_, current->visible,
                      {options_.map.features_per_frame, options_.map.choose_by_information,
@@ -176,7 +180,8 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
   if (options_.mapping) {
     learnSlopes(*current);
-    map_.recordInformation(current->visible, current->visible_bits, current->interval_s);
+    map_.recordInformation(current->visible, current->visible_bits, current->behind_mask,
+                           current->interval_s);
   }
   recordSearches(*current, frame->index);
   if (!are_depths_guessed && !frame->repeated_image) judgeQuality(*current);

@@ -92,6 +92,13 @@ TEST(GreedyInformation, OfOneIsHalfTheLogarithmOfTheDeterminant) {
     EXPECT_NEAR(informationBits(all[i]), 0.5 * logDeterminant2(all, {i}), 1e-9);
 }
 
+TEST(GreedyInformation, CountsWhatAMeasurementTellsBesides) {
+  auto all = draw(40, 4);
+  const int last = chooseByInformation(all, {40, 0.0, 0.0}).order.back();
+  all[last].own_bits = 100.0;
+  EXPECT_EQ(last, chooseByInformation(all, {1, 0.0, 0.0}).order.front());
+}
+
 TEST(GreedyInformation, OfNothingIsNothing) {
   EXPECT_TRUE(chooseByInformation({}, {10, 0.0, 0.0}).order.empty());
   EXPECT_TRUE(chooseByInformation(draw(3, 1), {0, 0.0, 0.0}).order.empty());

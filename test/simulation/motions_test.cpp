@@ -160,8 +160,8 @@ TEST(Motions, AnUnknownNameIsRefusedWithTheList) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(
         error.what(),
-        "motion = 'sprint' is not one of slow, jerky, sideways, forward, sweep, circle, still, "
-        "shake");
+        "motion = 'sprint' is not one of slow, jerky, sideways, forward, sweep, circle, loop, "
+        "still, shake");
   }
 }
 

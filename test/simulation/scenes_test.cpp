@@ -64,7 +64,7 @@ TEST(Scenes, AnUnknownNameIsRefusedWithTheList) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
                  "scene = 'moon' is not one of room, office, walkway, desk, checkerboard, "
-                 "two_depths, corridor, corridor_end, wall");
+                 "two_depths, corridor, corridor_end, corridor_loop, rooms, wall");
   }
 }
 

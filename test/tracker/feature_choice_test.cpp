@@ -31,17 +31,20 @@ bool isMeasured(const TrackedFrame& frame, FeatureId id) {
   return std::find(ids.begin(), ids.end(), id) != ids.end();
 }
 
-double meanCameraBits(const Frames& frames) {
+/// What the measured features tell of the state, each by itself: the mean over the frames.
+double meanStateBits(const Frames& frames) {
   double sum = 0.0;
-  for (const auto& frame : frames) sum += frame->camera_bits;
+  for (const auto& frame : frames)
+    for (const TrackedFeature& feature : frame->features)
+      if (isMeasured(*frame, feature.id)) sum += feature.state_bits;
   return sum / static_cast<double>(frames.size());
 }
 
-TEST(FeatureChoice, TellsMoreOfTheCameraThanAsManySpreadOverTheImage) {
-  const double by_information = meanCameraBits(trackChoosing(choiceOptions(true, 12))),
-               by_place = meanCameraBits(trackChoosing(choiceOptions(false, 12)));
+TEST(FeatureChoice, TellsMoreThanAsManySpreadOverTheImage) {
+  const double by_information = meanStateBits(trackChoosing(choiceOptions(true, 12))),
+               by_place = meanStateBits(trackChoosing(choiceOptions(false, 12)));
   EXPECT_GT(by_place, 0.0);
-  EXPECT_GT(by_information, by_place);
+  EXPECT_GT(by_information, 1.1 * by_place);
 }
 
 TEST(FeatureChoice, StopsWhereTheNextWouldTellTooLittle) {
@@ -58,25 +61,26 @@ TEST(FeatureChoice, StopsWhereTheNextWouldTellTooLittle) {
     measured[2] += fewest[i]->prior.size();
     EXPECT_EQ(fewest[i]->state, TrackingState::kTracking);
     EXPECT_GE(fewest[i]->matching.statistics.matched, 8) << "enough for a consensus, frame " << i;
-    EXPECT_LT(some[i]->camera_bits_left, 0.5);
+    EXPECT_LT(some[i]->state_bits_left, 0.5);
   }
   EXPECT_LT(measured[1], measured[0]);
   EXPECT_LT(measured[2], measured[1]);
 }
 
-TEST(FeatureChoice, KeepsPlacesForOpenDepths) {
-  int asked = 0;
+TEST(FeatureChoice, MeasuresOpenDepthsToo) {
+  int asked = 0, measured = 0;
   for (const auto& frame : trackChoosing(choiceOptions(true, 16))) {
+    EXPECT_LE(frame->prior.size(), 16);
     const TrackedFeature* most = nullptr;
     const auto own = [](const TrackedFeature& f) { return f.state_bits - f.camera_bits; };
     for (const TrackedFeature& feature : frame->features)
       if (feature.state_bits > 0.0 && (!most || own(feature) > own(*most))) most = &feature;
     if (!most) continue;
     ++asked;
-    EXPECT_TRUE(isMeasured(*frame, most->id)) << "frame " << frame->index;
-    EXPECT_LE(frame->prior.size(), 16);
+    measured += isMeasured(*frame, most->id);
   }
   EXPECT_GT(asked, 10);
+  EXPECT_GT(measured, asked / 2);
 }
 
 }  // namespace

@@ -6,10 +6,12 @@
 namespace active_matching_slam {
 
 /// A measurement that may be taken, or not, of an unknown c ~ N(0, I) of 12 dimensions: z = W c +
-/// n, n ~ N(0, I_2). It fails with probability 1 - `probability` and has a cost.
+/// n, n ~ N(0, I_2). Besides it tells `own_bits` of something that no other measurement tells of.
+/// It fails with probability 1 - `probability` and has a cost.
 struct InformativeMeasurement {
   using Jacobian = Eigen::Matrix<double, 2, 12>;
   Jacobian W;
+  double own_bits = 0.0;
   double probability = 1.0;
   double cost = 1.0;  ///< > 0, of any unit
 };

@@ -31,6 +31,7 @@ struct MapFeature {
   /// What its match tells of the camera [bit], averaged over the last seconds; 0 in a frame in
   /// which it is not visible. Negative: not known yet.
   double information_bits = -1.0;
+  bool behind_mask = false;  ///< should be seen in the last image, but not in the part in use
   std::int64_t first_frame = 0;
   std::int64_t last_matched_frame = 0;
 };
@@ -105,12 +106,14 @@ class FeatureMap {
   std::vector<FeatureId> drifting() const;
 
   /// Averages what the features that should be visible tell of the camera, `bits` of each, expected
-  /// in a frame `interval_s` after the last. The others tell nothing.
+  /// in a frame `interval_s` after the last. Of those `behind_mask` (ascending id) nothing can be
+  /// said; the others tell nothing.
   void recordInformation(const std::vector<VisibleFeature>& visible,
-                         const std::vector<double>& bits, double interval_s);
+                         const std::vector<double>& bits, const std::vector<FeatureId>& behind_mask,
+                         double interval_s);
 
   /// The `count` features of least MapFeature::information_bits. Never a known one, nor one of
-  /// which they are not known yet.
+  /// which they are not known: yet, or because it is behind the mask.
   std::vector<FeatureId> leastInformative(int count) const;
 
   /// The `count` features of least use to the camera where it is: with the largest sum of the angle

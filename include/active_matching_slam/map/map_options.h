@@ -8,8 +8,8 @@ namespace active_matching_slam {
 struct MapOptions {
   int features_per_frame = 60;  ///< wanted measured features in a frame
   int maximum_features = 150;   ///< the map never holds more
-  /// Features are measured by what they tell of the camera; else spread over the image.
-  bool choose_by_information = true;
+  /// Features are measured by what they tell; else spread over the image.
+  bool choose_by_information = false;
   /// Those leave a full map that tell least of the camera; else by a rule of thumb.
   bool retire_by_information = true;
   /// A new feature keeps from every predicted one [px of an image of 640 x 480].
@@ -30,8 +30,8 @@ void MapOptions::visitFields(Self& o, Visitor&& visit) {
   visit(basicOption("map/maximum_features", "", "the map never holds more"), o.maximum_features, 4,
         5000);
   visit(advancedOption("map/choose_by_information", "",
-                       "measure the features that tell most of the camera for their time; false: "
-                       "features spread over the image"),
+                       "measure the features that tell most for their time; false: those "
+                       "spread over the image"),
         o.choose_by_information);
   visit(
       advancedOption("map/retire_by_information", "",

@@ -56,7 +56,7 @@ struct MatchOptions {
   double fast_accept_weight = 0.7;  ///< fast_active: weight at which a Gaussian is taken after that
   std::uint64_t seed = 1;           ///< fast_active, one_point_ransac
 
-  /// Features that would tell less than this of the camera, given those that are searched, are not
+  /// Features that would tell less than this of the state, given those that are searched, are not
   /// searched; 0: all are. With MapOptions::choose_by_information.
   double stop_bits = 0.0;
 
@@ -97,8 +97,8 @@ void MatchOptions::visitFields(Self& o, Visitor&& visit) {
       basicOption("matching/max_pixels", "px", "distinct pixels searched in a frame; 0: no limit"),
       o.max_pixels, std::int64_t{0}, std::int64_t{1} << 40);
   visit(basicOption("matching/stop_bits", "bit",
-                    "a frame is measured no further when the next feature would tell less of the "
-                    "camera than this; 0: all are searched. Needs map/choose_by_information"),
+                    "a frame is measured no further when the next feature would tell less than "
+                    "this; 0: all are searched. Needs map/choose_by_information"),
         o.stop_bits, 0.0, 100.0);
   visit(advancedOption("matching/true_positive_rate", "",
                        "probability of a match where a feature is (Ptp)"),

@@ -107,9 +107,9 @@ struct TrackedFrame {
   /// What the image told of the camera (position, rotation, both velocities), 1/2 log2 |P| before
   /// over after [bit].
   double camera_bits = 0.0;
-  /// What the best of the visible features would have told of it that was not chosen; 0: none was
-  /// left [bit].
-  double camera_bits_left = 0.0;
+  /// What the best of the visible features would have told of the state that was not chosen; 0:
+  /// none was left [bit].
+  double state_bits_left = 0.0;
 
   std::vector<TrackedFeature> features;
   std::vector<std::vector<SearchMatch>> matches;  ///< all matches met, per entry of `prior`
