@@ -17,22 +17,22 @@ namespace {
 
 constexpr int kRequestFeatures = 30;
 
-struct Structure {
+struct RequestStructure {
   MutualInformationGraph graph;
   SubmapHierarchy hierarchy;
 };
 
-Structure structureOf(unsigned seed) {
+RequestStructure requestStructureOf(unsigned seed) {
   std::vector<std::int64_t> ids(kRequestFeatures);
   std::iota(ids.begin(), ids.end(), 0);
-  Structure s;
+  RequestStructure s;
   s.graph = informationGraph(ids, test::randomMeasurementCovariance(kRequestFeatures, seed));
   s.hierarchy = buildSubmapHierarchy(s.graph);
   return s;
 }
 
 TEST(RequestedSubmaps, AreAsManyAsAskedFor) {
-  const Structure s = structureOf(1);
+  const RequestStructure s = requestStructureOf(1);
   SubmapOptions options;
   for (const int count : {1, 2, 5, 9}) {
     options.count = count;
@@ -43,7 +43,7 @@ TEST(RequestedSubmaps, AreAsManyAsAskedFor) {
 TEST(RequestedSubmaps, PreserveAsMuchAsAskedForAndOneMoreWouldNot) {
   SubmapOptions options;
   for (unsigned seed = 1; seed <= 3; ++seed) {
-    const Structure s = structureOf(seed);
+    const RequestStructure s = requestStructureOf(seed);
     const double of_three = cutIntoSubmaps(s.graph, s.hierarchy, 3).preserved;
     for (const double fraction : {0.3, 0.6, of_three, 0.95}) {
       options.preserve = fraction;
@@ -56,7 +56,7 @@ TEST(RequestedSubmaps, PreserveAsMuchAsAskedForAndOneMoreWouldNot) {
 }
 
 TEST(RequestedSubmaps, AreNoLargerThanAskedFor) {
-  const Structure s = structureOf(2);
+  const RequestStructure s = requestStructureOf(2);
   SubmapOptions options;
   options.max_features = 7;
   const SubmapPartition partition = requestedSubmaps(s.graph, s.hierarchy, options);
