@@ -72,11 +72,13 @@ void measureAll(benchmark::State& state, const Joint& joint) {
 
 void measureAllDense(benchmark::State& state) {
   const Eigen::MatrixXd S = covarianceOf(state);
-  measureAll(state, *makeDenseJoint(S, featureInformation(S).precision_determinant, 1.0));
+  measureAll(state, *makeDenseJoint(S, featureInformation(S).precision_determinant,
+                                    Eigen::VectorXd::Ones(S.rows() / 2)));
 }
 
 void measureAllByMessages(benchmark::State& state) {
-  measureAll(state, *makeTreeJoint(chowLiuTree(covarianceOf(state)), 1.0));
+  const ChowLiuTree tree = chowLiuTree(covarianceOf(state));
+  measureAll(state, *makeTreeJoint(tree, Eigen::VectorXd::Ones(tree.size())));
 }
 
 #define AMS_FEATURES                  \

@@ -274,7 +274,7 @@ void registerShortcuts() {
     return conditional.trace();
   });
   registerShortcut("shortcut/C all measurements in turn", [S, precision] {
-    const auto joint = makeDenseJoint(S, precision, 1.0);
+    const auto joint = makeDenseJoint(S, precision, Eigen::VectorXd::Ones(S.rows() / 2));
     auto given = joint->prior();
     for (int c = 0; c + 1 < kShortcutFeatures; ++c) given = joint->measure(given, c);
     return given->marginal(kShortcutFeatures - 1).covariance.trace();

@@ -24,6 +24,12 @@ foreach(name commands machines rosrun)
     "AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION};AMS_TEST_BAG=${test_bag};AMS_BUILT=${CMAKE_BINARY_DIR}")
 endforeach()
 
+# What the page of reproductions says of the quick run.
+add_test(NAME ${PROJECT_NAME}_reproduction
+  COMMAND ${PYTHON_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test/documents/reproduction_test.py)
+set_tests_properties(${PROJECT_NAME}_reproduction PROPERTIES ENVIRONMENT
+  AMS_PROGRAMS=${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+
 add_test(NAME ${PROJECT_NAME}_compare_runs COMMAND ${CATKIN_ENV} ${PYTHON_EXECUTABLE}
   ${CMAKE_CURRENT_SOURCE_DIR}/test/tools/compare_runs_test.py)
 set_tests_properties(${PROJECT_NAME}_compare_runs PROPERTIES ENVIRONMENT

@@ -22,6 +22,10 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.lens = frame.camera.lens;
   record.nis = frame.nis;
   record.nis_degrees = frame.nis_degrees;
+  record.camera_bits = frame.camera_bits;
+  record.state_bits_left = frame.state_bits_left;
+  record.camera_bits_per_ms = cameraBitsPerMillisecond(frame);
+  record.tree_divergence_bits = treeDivergenceBits(frame);
   record.map_features = static_cast<int>(frame.features.size());
   for (const TrackedFeature& feature : frame.features) {
     if (feature.kind == FeatureKind::kPoint) ++record.map_points;

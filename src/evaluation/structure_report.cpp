@@ -149,16 +149,22 @@ std::string submapsCsv(const SubmapHierarchy& hierarchy) {
              std::to_string(hierarchy.levels[h].submap_of_feature[i]) + "\n";
     }
   }
+  if (hierarchy.requested.submaps > 0)
+    for (std::size_t i = 0; i < hierarchy.ids.size(); ++i)
+      csv += "requested," + std::to_string(hierarchy.ids[i]) + "," +
+             std::to_string(hierarchy.requested.submap_of_feature[i]) + "\n";
   return csv;
 }
 
 std::string submapQualityCsv(const SubmapHierarchy& hierarchy) {
   std::string csv = "level,submaps,preserved_chow_liu,preserved_naive\n";
-  for (std::size_t h = 0; h < hierarchy.levels.size(); ++h) {
-    const SubmapLevel& level = hierarchy.levels[h];
-    csv += std::to_string(h) + "," + std::to_string(level.submaps) + "," +
-           numberText(level.preserved_chow_liu) + "," + numberText(level.preserved_naive) + "\n";
-  }
+  const auto row = [&csv](const std::string& name, const SubmapLevel& level) {
+    csv += name + "," + std::to_string(level.submaps) + "," + numberText(level.preserved_chow_liu) +
+           "," + numberText(level.preserved_naive) + "\n";
+  };
+  for (std::size_t h = 0; h < hierarchy.levels.size(); ++h)
+    row(std::to_string(h), hierarchy.levels[h]);
+  if (hierarchy.requested.submaps > 0) row("requested", hierarchy.requested);
   return csv;
 }
 

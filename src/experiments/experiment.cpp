@@ -20,6 +20,8 @@ const std::vector<Experiment>& experiments() {
   static const std::vector<Experiment> list = {
       {{"fig_4_2", "figures 4.2, 4.3: an object pinned down by MI, and by MI per pixel"},
        runPinDown},
+      {{"fig_4_4", "figure 4.4: information about the other features, and about the camera"},
+       runInformationMeasures},
       {{"fig_5_3", "figure 5.3: search of a line, pixel by pixel, with a histogram"},
        runHistogramSearch},
       {{"table_5_2", "table 5.2: one tracking step with 11 features, JCBB and AM"},
@@ -29,6 +31,8 @@ const std::vector<Experiment>& experiments() {
       {{"fig_5_14", "figures 5.14, 5.15: information by matching step"}, runInformationSteps},
       {{"table_6_1", "table 6.1, figures 6.13, 6.14: information that submaps preserve"},
        runSubmaps},
+      {{"fig_6_10", "figures 6.10, 6.11: submaps that come apart, and those of a larger place"},
+       runSubmapsOverTime},
       {{"fig_7_2", "figures 7.2, 7.3: FAM and JCBB by number of features and frame rate"},
        runFastMatching},
       {{"table_7_1", "figures 7.7, 7.8, table 7.1: pixels and time of CLAM, to 400 features"},

@@ -31,6 +31,8 @@ constexpr Definition kDefinitions[] = {
     {"two_depths", "two_depths", "circle", 640, 480, 12.0, 1.0, 1.0},
     {"wall", "wall", "sideways", 640, 480, 12.0, 1.0, 1.0},
     {"corridor", "corridor", "forward", 640, 480, 12.0, 1.0, 1.0},
+    {"corridor_end", "corridor_end", "sweep", 640, 480, 15.0, 1.0, 1.0},
+    {"corridor_loop", "corridor_loop", "loop", 640, 480, 40.0, 1.0, 1.0},
     {"desk", nullptr, "davison_monoslam_desk", 0, 0, 15.0, 4.0, 4.0},
     {"checkerboard", nullptr, "uzh_vamr_checkerboard", 0, 0, 15.0, 4.0, 4.0},
 };

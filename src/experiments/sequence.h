@@ -28,7 +28,7 @@ struct Sequence {
 };
 
 /// Names: office_slow, office_fast, walkway_slow, walkway_fast, walkway_straight, two_depths, wall,
-/// corridor (simulated) and desk, checkerboard (recorded). `quick`: half the size, and shorter.
+/// corridor, corridor_end, corridor_loop (simulated) and desk, checkerboard (recorded). `quick`: half the size, and shorter.
 bool isRecordedName(const std::string& name);
 Sequence loadSequence(const std::string& name, const std::string& data_folder, bool quick);
 

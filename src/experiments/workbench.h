@@ -71,11 +71,13 @@ inline Finding::Verdict verdict(bool agrees) {
 
 // The experiments.
 ExperimentResult runPinDown(Workbench& bench);
+ExperimentResult runInformationMeasures(Workbench& bench);
 ExperimentResult runHistogramSearch(Workbench& bench);
 ExperimentResult runTrackingStep(Workbench& bench);
 ExperimentResult runFeaturesAndRate(Workbench& bench);
 ExperimentResult runInformationSteps(Workbench& bench);
 ExperimentResult runSubmaps(Workbench& bench);
+ExperimentResult runSubmapsOverTime(Workbench& bench);
 ExperimentResult runFastMatching(Workbench& bench);
 ExperimentResult runScalableMatching(Workbench& bench);
 ExperimentResult runTrajectories(Workbench& bench);

@@ -56,10 +56,11 @@ double MeasurementNoise::inflation(const FitPrecision& fit, const LandmarkNoise&
   return std::max(1.0, inflation() * landmark.scale() * std::pow(unscaledSigma_px(fit) / bound, 2));
 }
 
-double MeasurementNoise::gateSigma_px() const {
+double MeasurementNoise::gateSigma_px(const LandmarkNoise& landmark) const {
   if (!has_learnt_) return options_.sigma_px;
   // Wrong matches would widen the gates that let them in.
-  return std::sqrt(std::pow(std::min(typicalSigma_px(), options_.sigma_px), 2) + kPixelVariance);
+  const double bounded_px = std::min(sigma_px({fit_px_}, landmark), options_.sigma_px);
+  return std::sqrt(bounded_px * bounded_px + kPixelVariance);
 }
 
 double MeasurementNoise::degrees() const { return scale_.degrees(); }

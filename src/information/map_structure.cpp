@@ -1,5 +1,7 @@
 #include "active_matching_slam/information/map_structure.h"
 
+#include <utility>
+
 namespace active_matching_slam {
 
 void MapStructure::addFrame(const std::vector<std::int64_t>& ids,
@@ -9,7 +11,9 @@ void MapStructure::addFrame(const std::vector<std::int64_t>& ids,
   accumulator_.addFrame(ids, S);
 }
 
-void MapStructure::keepOnly(const std::vector<std::int64_t>& ids) { accumulator_.keepOnly(ids); }
+void MapStructure::forgetWeakest(const std::vector<std::int64_t>& ids, int most) {
+  accumulator_.forgetWeakest(ids, most);
+}
 
 void MapStructure::clear() {
   accumulator_.clear();
@@ -17,9 +21,14 @@ void MapStructure::clear() {
   is_outdated_ = false;
 }
 
-MapStructure::Snapshot MapStructure::snapshot() {
+MapStructure::Snapshot MapStructure::snapshot(const SubmapOptions& options) {
   auto graph = std::make_shared<MutualInformationGraph>(accumulator_.links());
   auto submaps = std::make_shared<SubmapHierarchy>(buildSubmapHierarchy(*graph));
+  if (options.isRequest()) {
+    SubmapPartition partition = requestedSubmaps(*graph, *submaps, options);
+    submaps->requested = levelOfLabels(std::move(partition.submap_of_feature), partition.submaps,
+                                       graphEdges(*graph));
+  }
   tracker_.relabel(*submaps);
   return {std::move(graph), std::move(submaps)};
 }

@@ -5,11 +5,16 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "active_matching_slam/information/pair_dependence.h"
 
 namespace active_matching_slam {
 namespace {
+
+/// Features beyond what is kept, as a part of it, before some are forgotten. Cost: a pass over all
+/// links each time.
+constexpr std::size_t kSpare = 10;
 
 /// Indices of the frame's features by ascending id.
 std::vector<int> orderById(const std::vector<std::int64_t>& ids) {
@@ -98,13 +103,26 @@ void MutualInformationAccumulator::remove(std::int64_t id) {
   }
 }
 
-void MutualInformationAccumulator::keepOnly(std::vector<std::int64_t> ids) {
+void MutualInformationAccumulator::forgetWeakest(std::vector<std::int64_t> ids, int most) {
   std::sort(ids.begin(), ids.end());
-  std::vector<std::int64_t> gone;
-  for (const auto& feature : features_) {
-    if (!std::binary_search(ids.begin(), ids.end(), feature.first)) gone.push_back(feature.first);
+  std::map<std::int64_t, double> bits_of;  // of those that may be forgotten
+  for (const auto& feature : features_)
+    if (!std::binary_search(ids.begin(), ids.end(), feature.first)) bits_of[feature.first] = 0.0;
+  const std::size_t kept = static_cast<std::size_t>(most);
+  if (bits_of.size() <= kept + kept / kSpare) return;
+  for (const auto& [id, partners] : features_) {
+    const auto own = bits_of.find(id);
+    for (const Partner& partner : partners) {
+      const double bits = partner.sum_bits / partner.frames;
+      if (own != bits_of.end()) own->second += bits;
+      const auto other = bits_of.find(partner.id);
+      if (other != bits_of.end()) other->second += bits;
+    }
   }
-  for (std::int64_t id : gone) remove(id);
+  std::vector<std::pair<double, std::int64_t>> weakest;
+  for (const auto& [id, bits] : bits_of) weakest.emplace_back(bits, id);
+  std::sort(weakest.begin(), weakest.end());
+  for (std::size_t i = 0; i + kept < weakest.size(); ++i) remove(weakest[i].second);
 }
 
 MutualInformationGraph MutualInformationAccumulator::links() const {

@@ -10,17 +10,6 @@
 namespace active_matching_slam {
 namespace {
 
-SubmapLevel levelOf(DisjointSets& sets, const std::vector<WeightedEdge>& edges, int features) {
-  SubmapLevel level;
-  level.submap_of_feature = sets.labels();
-  level.submaps = sets.count();
-  if (level.submaps == features || level.submaps == 1) return level;  // nothing is cut
-  level.preserved_chow_liu = preservedInformation(edges, level.submap_of_feature, level.submaps);
-  level.preserved_naive =
-      preservedInformation(edges, naivePartition(features, level.submaps), level.submaps);
-  return level;
-}
-
 void checkLabels(const std::vector<int>& labels, int clusters) {
   for (int label : labels) {
     if (label >= 0 && label < clusters) continue;
@@ -30,6 +19,19 @@ void checkLabels(const std::vector<int>& labels, int clusters) {
 }
 
 }  // namespace
+
+SubmapLevel levelOfLabels(std::vector<int> labels, int submaps,
+                          const std::vector<WeightedEdge>& edges) {
+  const int features = static_cast<int>(labels.size());
+  SubmapLevel level;
+  level.submap_of_feature = std::move(labels);
+  level.submaps = submaps;
+  if (level.submaps == features || level.submaps == 1) return level;  // nothing is cut
+  level.preserved_chow_liu = preservedInformation(edges, level.submap_of_feature, level.submaps);
+  level.preserved_naive =
+      preservedInformation(edges, naivePartition(features, level.submaps), level.submaps);
+  return level;
+}
 
 SubmapHierarchy buildSubmapHierarchy(MutualInformationGraph& graph) {
   const std::vector<WeightedEdge> edges = graphEdges(graph);
@@ -42,13 +44,13 @@ SubmapHierarchy buildSubmapHierarchy(MutualInformationGraph& graph) {
     hierarchy.merges.push_back({link.edge.first, link.edge.second, link.edge.weight, link.round});
   }
   DisjointSets sets(features);
-  hierarchy.levels.push_back(levelOf(sets, edges, features));
+  hierarchy.levels.push_back(levelOfLabels(sets.labels(), sets.count(), edges));
   for (std::size_t m = 0; m < hierarchy.merges.size(); ++m) {
     const SubmapMerge& merge = hierarchy.merges[m];
     sets.unite(merge.first, merge.second);
     const bool level_done =
         m + 1 == hierarchy.merges.size() || hierarchy.merges[m + 1].level != merge.level;
-    if (level_done) hierarchy.levels.push_back(levelOf(sets, edges, features));
+    if (level_done) hierarchy.levels.push_back(levelOfLabels(sets.labels(), sets.count(), edges));
   }
   return hierarchy;
 }

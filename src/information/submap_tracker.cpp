@@ -31,27 +31,37 @@ std::vector<int> matchLabels(const std::vector<std::int64_t>& ids, const SubmapL
   return label_of_cluster;
 }
 
+void relabelLevel(const std::vector<std::int64_t>& ids, SubmapLevel* level,
+                  std::map<std::int64_t, int>* labels) {
+  std::vector<int> label_of_cluster = matchLabels(ids, *level, *labels);
+  std::set<int> taken;
+  for (const auto& old : *labels) taken.insert(old.second);
+  int next = 0;
+  for (int& label : label_of_cluster) {
+    if (label >= 0) continue;
+    while (taken.count(next) > 0) ++next;
+    label = next++;
+  }
+  labels->clear();
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    level->submap_of_feature[i] = label_of_cluster[level->submap_of_feature[i]];
+    labels->emplace_hint(labels->end(), ids[i], level->submap_of_feature[i]);
+  }
+}
+
 }  // namespace
 
 void SubmapTracker::relabel(SubmapHierarchy& hierarchy) {
   if (labels_.size() < hierarchy.levels.size()) labels_.resize(hierarchy.levels.size());
-  for (std::size_t h = 0; h < hierarchy.levels.size(); ++h) {
-    SubmapLevel& level = hierarchy.levels[h];
-    std::vector<int> label_of_cluster = matchLabels(hierarchy.ids, level, labels_[h]);
-    std::set<int> taken;
-    for (const auto& old : labels_[h]) taken.insert(old.second);
-    int next = 0;
-    for (int& label : label_of_cluster) {
-      if (label >= 0) continue;
-      while (taken.count(next) > 0) ++next;
-      label = next++;
-    }
-    labels_[h].clear();
-    for (std::size_t i = 0; i < hierarchy.ids.size(); ++i) {
-      level.submap_of_feature[i] = label_of_cluster[level.submap_of_feature[i]];
-      labels_[h].emplace_hint(labels_[h].end(), hierarchy.ids[i], level.submap_of_feature[i]);
-    }
-  }
+  for (std::size_t h = 0; h < hierarchy.levels.size(); ++h)
+    relabelLevel(hierarchy.ids, &hierarchy.levels[h], &labels_[h]);
+  if (hierarchy.requested.submaps > 0)
+    relabelLevel(hierarchy.ids, &hierarchy.requested, &requested_);
+}
+
+void SubmapTracker::clear() {
+  labels_.clear();
+  requested_.clear();
 }
 
 }  // namespace active_matching_slam

@@ -31,6 +31,10 @@ constexpr double kMaximumDriftPx = 0.3;
 /// fault. Derivation: an image that is half occluded, with some misses besides, is not.
 constexpr int kInverseFaultyFraction = 3;
 
+/// Memory of what a feature tells of the camera [s]. Cost: with less, a glance aside empties the
+/// map of what is behind; with more, it keeps features of where the camera was.
+constexpr double kInformationMemory_s = 2.0;
+
 bool byId(const MapFeature& a, FeatureId id) { return a.id < id; }
 
 Eigen::Vector2d medianInnovation(const std::vector<SearchRecord>& searches) {
@@ -198,6 +202,37 @@ std::vector<FeatureId> FeatureMap::drifting() const {
     if (!feature.known && feature.successes >= kMinimumMatchesForDrift &&
         feature.drift_px.norm() > limit)
       ids.push_back(feature.id);
+  return ids;
+}
+
+void FeatureMap::recordInformation(const std::vector<VisibleFeature>& visible,
+                                   const std::vector<double>& bits,
+                                   const std::vector<FeatureId>& behind_mask, double interval_s) {
+  const double kept = std::exp(-std::max(interval_s, 0.0) / kInformationMemory_s);
+  std::size_t next = 0;
+  for (MapFeature& feature : features_) {
+    feature.behind_mask = std::binary_search(behind_mask.begin(), behind_mask.end(), feature.id);
+    if (feature.behind_mask) continue;
+    const bool is_visible = next < visible.size() && visible[next].id == feature.id;
+    const double now = is_visible ? bits[next++] : 0.0;
+    const bool is_known = feature.information_bits >= 0.0;
+    feature.information_bits =
+        is_known ? kept * feature.information_bits + (1.0 - kept) * now : now;
+  }
+}
+
+std::vector<FeatureId> FeatureMap::leastInformative(int count) const {
+  std::vector<const MapFeature*> candidates;
+  for (const MapFeature& feature : features_)
+    if (!feature.known && !feature.behind_mask && feature.information_bits >= 0.0)
+      candidates.push_back(&feature);
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const MapFeature* a, const MapFeature* b) {
+                     return a->information_bits < b->information_bits;
+                   });
+  std::vector<FeatureId> ids;
+  for (int i = 0; i < count && i < static_cast<int>(candidates.size()); ++i)
+    ids.push_back(candidates[i]->id);
   return ids;
 }
 

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "active_matching_slam/image/image_options.h"
+#include "active_matching_slam/information/mutual_information_accumulator.h"
 #include "active_matching_slam/map/map_file.h"
 
 namespace active_matching_slam {
@@ -12,7 +13,7 @@ namespace {
 
 /// Both line ends reveal a transfer as text.
 constexpr char kMagic[9] = "AMSMAP\r\n";
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kVersion = 5;
 constexpr std::size_t kHeaderSize = 8 + 4 + 4 + 8;
 constexpr std::size_t kMaximumName = 1024, kMaximumDistortion = 16;
 constexpr std::size_t kMinimumFeature = 8 + 1 + 13 * 8;  ///< bytes of a FeatureState
@@ -269,12 +270,46 @@ void check(const MapFileContent& content) {
     throw std::invalid_argument("image/source_patch_size_px is beyond what a map file holds");
   Ekf(FilterOptions())
       .restore(content.camera_state, content.features, content.covariance, content.next_id);
+  MutualInformationAccumulator{content.graph};
   if (content.map.size() != content.features.size())
     throw std::invalid_argument("map and filter hold different numbers of features");
   for (std::size_t i = 0; i < content.map.size(); ++i) {
     if (content.map[i].id != content.features[i].id)
       throw std::invalid_argument("map and filter hold different features");
     checkMapFeature(content.map[i], content);
+  }
+}
+
+/// Bytes of a link of the graph.
+constexpr std::size_t kLinkSize = 8 + 8 + 8 + 8;
+
+MutualInformationGraph readGraph(Reader* in) {
+  MutualInformationGraph graph;
+  const auto count = [in](const char* what, std::size_t size) {
+    return static_cast<std::size_t>(
+        in->integer(what, 0, static_cast<std::int64_t>(in->remaining() / size)));
+  };
+  graph.ids.resize(count("number of features in the graph", 8));
+  for (std::int64_t& id : graph.ids) id = in->integer();
+  graph.links.resize(count("number of links in the graph", kLinkSize));
+  for (InformationLink& link : graph.links) {
+    link.first = in->integer();
+    link.second = in->integer();
+    link.information_bits = in->real();
+    link.frames = in->smallInteger("frames of a link", 1, std::numeric_limits<int>::max());
+  }
+  return graph;
+}
+
+void write(const MutualInformationGraph& graph, Writer* out) {
+  out->integer(static_cast<std::int64_t>(graph.ids.size()));
+  for (const std::int64_t id : graph.ids) out->integer(id);
+  out->integer(static_cast<std::int64_t>(graph.links.size()));
+  for (const InformationLink& link : graph.links) {
+    out->integer(link.first);
+    out->integer(link.second);
+    out->real(link.information_bits);
+    out->integer(link.frames);
   }
 }
 
@@ -296,6 +331,7 @@ MapFileContent readContent(std::uint32_t version, Reader* in) {
     size += content.features.back().size();
   }
   for (std::size_t i = 0; i < count; ++i) content.map.push_back(readMapFeature(version, in));
+  if (version >= 5) content.graph = readGraph(in);
   // Nothing but the lower triangle is left; so its size is known before it is allocated. Version 1
   // has no calibration in it.
   const std::size_t calibration = version < 2 ? CameraError::kCalibrationSize : 0;
@@ -340,6 +376,7 @@ std::string serializeMap(const MapFileContent& content) {
   body.integer(static_cast<std::int64_t>(content.features.size()));
   for (const FeatureState& feature : content.features) write(feature, &body);
   for (const MapFeature& feature : content.map) write(feature, &body);
+  write(content.graph, &body);
   for (Eigen::Index j = 0; j < content.covariance.cols(); ++j)
     for (Eigen::Index i = j; i < content.covariance.rows(); ++i)
       body.real(content.covariance(i, j));

@@ -8,14 +8,6 @@
 namespace active_matching_slam {
 namespace {
 
-/// Modelled cost on one core of about 3 GHz.
-constexpr double kSearchMs = 8e-3, kPixelMs = 5e-6;
-
-/// Searches that a frame gets in any case: on a busy machine the time would end after a few,
-/// nothing would match, and the gates and the time for the next frame would grow. Derivation: of 13
-/// features that match with probability 0.8, at least 8 do in 97 % of frames; a pose takes 3.
-constexpr int kFloorSearches = 13;
-
 double steadySeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -36,12 +28,13 @@ SearchOutcome BudgetedSearch::search(int feature, const SearchEllipse& ellipse) 
   correlation_s_ += now() - start;
   ++searches_;
   pixels_ += outcome.correlations;
-  charge(kSearchMs + kPixelMs * static_cast<double>(outcome.correlations));
+  charge(modelledSearch_ms(static_cast<double>(outcome.correlations)));
   return outcome;
 }
 
 double BudgetedSearch::fractionUsed() const {
-  // The clock is read only if it counts.
+  // On a busy machine the time would end after a few searches, nothing would match, and the gates
+  // and the time for the next frame would grow. The clock is read only if it counts.
   const bool counts = options_.max_milliseconds > 0.0 && searches_ >= kFloorSearches;
   return fractionOfBudget(options_, pixels_, counts ? spentMilliseconds() : 0.0);
 }

@@ -40,8 +40,8 @@ void subtractColumns(const double* factor, int columns, int rows, const double* 
 class DenseJoint : public Joint {
  public:
   DenseJoint(const Eigen::MatrixXd& S, const Eigen::VectorXd& precision_determinant,
-             double noise_variance)
-      : Joint(Eigen::Matrix2d::Identity() * noise_variance, precision_determinant), S_(S) {
+             const Eigen::VectorXd& noise_variances)
+      : Joint(noise_variances, precision_determinant), S_(S) {
     auto prior = std::make_shared<DenseConditional>();
     marginalsOf(*prior).resize(static_cast<std::size_t>(size()));
     measuredOf(*prior).assign(static_cast<std::size_t>(size()), 0);
@@ -159,8 +159,8 @@ class DenseJoint : public Joint {
 
 std::unique_ptr<Joint> makeDenseJoint(const Eigen::MatrixXd& S,
                                       const Eigen::VectorXd& precision_determinant,
-                                      double noise_variance) {
-  return std::make_unique<DenseJoint>(S, precision_determinant, noise_variance);
+                                      const Eigen::VectorXd& noise_variances) {
+  return std::make_unique<DenseJoint>(S, precision_determinant, noise_variances);
 }
 
 }  // namespace active_matching_slam

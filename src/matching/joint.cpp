@@ -7,8 +7,9 @@
 
 namespace active_matching_slam {
 
-Joint::Joint(const Eigen::Matrix2d& noise, Eigen::VectorXd precision_determinant)
-    : noise_(noise), precision_determinant_(std::move(precision_determinant)) {}
+Joint::Joint(Eigen::VectorXd noise_variances, Eigen::VectorXd precision_determinant)
+    : noise_variances_(std::move(noise_variances)),
+      precision_determinant_(std::move(precision_determinant)) {}
 
 std::shared_ptr<const Conditional> Joint::measure(const std::shared_ptr<const Conditional>& given,
                                                   int feature) const {
@@ -36,7 +37,8 @@ void Joint::inherit(Conditional& conditional, const Conditional& given, int feat
   conditional.marginals_ = given.marginals_;
   conditional.measured_ = given.measured_;
   conditional.measured_[slot] = 1;
-  conditional.marginals_[slot] = {noise_, noise_.determinant(), 0.0};
+  const double variance = noise_variances_(feature);
+  conditional.marginals_[slot] = {variance * Eigen::Matrix2d::Identity(), variance * variance, 0.0};
 }
 
 }  // namespace active_matching_slam

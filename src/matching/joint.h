@@ -57,8 +57,9 @@ class Joint {
                                              int feature) const;
 
  protected:
-  /// `noise`: R, the marginal of a measured feature. `precision_determinant`: F, |L_ff|.
-  Joint(const Eigen::Matrix2d& noise, Eigen::VectorXd precision_determinant);
+  /// `noise_variances`: F, of R, the marginal of a measured feature. `precision_determinant`: F,
+  /// |L_ff|.
+  Joint(Eigen::VectorXd noise_variances, Eigen::VectorXd precision_determinant);
   virtual std::shared_ptr<Conditional> derive(const std::shared_ptr<const Conditional>& given,
                                               int feature) const = 0;
   /// Sets a marginal with all that follows from it.
@@ -73,7 +74,7 @@ class Joint {
   static std::vector<Eigen::Matrix2d>& crossOf(Conditional& c) { return c.cross_; }
 
  private:
-  Eigen::Matrix2d noise_;
+  Eigen::VectorXd noise_variances_;
   Eigen::VectorXd precision_determinant_;
   std::shared_ptr<const Conditional> prior_;
 };
@@ -82,12 +83,13 @@ class Joint {
 /// O(F) for each feature measured before.
 std::unique_ptr<Joint> makeDenseJoint(const Eigen::MatrixXd& S,
                                       const Eigen::VectorXd& precision_determinant,
-                                      double noise_variance);
+                                      const Eigen::VectorXd& noise_variances);
 
 struct ChowLiuTree;
 
 /// A tree (or forest) of marginals and edge blocks; belief propagation outwards from the measured
 /// node, whose edges are then cut. (Chli 2009, eq. 7.19-7.25)
-std::unique_ptr<Joint> makeTreeJoint(const ChowLiuTree& tree, double noise_variance);
+std::unique_ptr<Joint> makeTreeJoint(const ChowLiuTree& tree,
+                                     const Eigen::VectorXd& noise_variances);
 
 }  // namespace active_matching_slam

@@ -70,7 +70,7 @@ struct Hypothesis {
   double log_weight = 0.0, weight = 1.0;
   double most_weight = 1.0;  ///< largest weight so far
   bool was_searched = false;
-  double log_merged = 0.0;  ///< what merged siblings added to log_weight
+  double log_merged = 0.0;               ///< what merged siblings added to log_weight
   const PriorGaussian* prior = nullptr;  ///< that it descends from
   std::shared_ptr<const Conditional> joint;
   std::vector<Eigen::Vector2d> mean;      ///< F, the match for a fused feature [px]
@@ -198,7 +198,9 @@ class Mixture {
   /// Whether other hypotheses found matches in its ellipses that it has not searched for.
   bool hasUnclaimedMatches(const Hypothesis& h) const;
   bool awaitsConfirmation(const Hypothesis& h) const {
-    return options_.deferred_pruning_weight > 0.0 && !h.was_searched &&
+    // A Gaussian of the prior claims no match that a search could confirm or refute.
+    const bool claims = h.parent >= 0;
+    return options_.deferred_pruning_weight > 0.0 && claims && !h.was_searched &&
            h.most_weight >= options_.deferred_pruning_weight && h.hasOpenCandidate();
   }
   /// Evidence for a hypothesis from one feature's matches, given where it predicts the feature;

@@ -35,14 +35,14 @@ MatchResult matchDense(const MeasurementPrior& given, FeatureSearch& search,
   MatchResult result = budgeted.begin(name);
   if (prior.size() > 0) {
     const auto joint =
-        makeDenseJoint(prior.S(), information.precision_determinant, given.noise_variance_px2);
+        makeDenseJoint(prior.S(), information.precision_determinant, prior.noiseVariances());
     std::vector<PriorGaussian> gaussians = {{joint.get(), &prior.S(), 1.0}};
     const Eigen::MatrixXd wide_S = prior.wideS();
     std::unique_ptr<Joint> wide;
     if (wide_S.rows() > 0) {
       const FeatureInformation of_wide = featureInformation(wide_S);
       if (of_wide.regularisation == 0.0) {
-        wide = makeDenseJoint(wide_S, of_wide.precision_determinant, given.noise_variance_px2);
+        wide = makeDenseJoint(wide_S, of_wide.precision_determinant, prior.noiseVariances());
         addWide(*wide, wide_S, prior.wideProbability(), &gaussians);
       }
     }
@@ -125,14 +125,14 @@ MatchResult ChowLiuMatcher::match(const MeasurementPrior& given, FeatureSearch& 
   for (const WeightedEdge& edge : tree.edges)
     result.tree_edges.emplace_back(prior.original(edge.first), prior.original(edge.second));
   if (prior.size() > 0) {
-    const auto joint = makeTreeJoint(tree, given.noise_variance_px2);
+    const auto joint = makeTreeJoint(tree, prior.noiseVariances());
     std::vector<PriorGaussian> gaussians = {{joint.get(), &prior.S(), 1.0}};
     const Eigen::MatrixXd wide_S = prior.wideS();
     std::unique_ptr<Joint> wide;
     if (wide_S.rows() > 0) {
       const ChowLiuTree wide_tree = chowLiuTree(wide_S);
       if (dependentFeature(wide_tree) < 0) {
-        wide = makeTreeJoint(wide_tree, given.noise_variance_px2);
+        wide = makeTreeJoint(wide_tree, prior.noiseVariances());
         addWide(*wide, wide_S, prior.wideProbability(), &gaussians);
       }
     }

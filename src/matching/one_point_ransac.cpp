@@ -63,7 +63,8 @@ class OnePointRansac {
       : prior_(prior), search_(budgeted), best_(std::move(best)) {}
 
   /// The low-innovation inliers of the best hypothesis.
-  std::vector<int> inliers(const std::vector<int>& hypotheses, double limit2) const {
+  std::vector<int> inliers(const std::vector<int>& hypotheses, double chi2) const {
+    const Eigen::VectorXd R = prior_.noiseVariances();
     std::vector<int> most;
     for (const int h : hypotheses) {
       const Eigen::Vector2d weighted =
@@ -73,7 +74,7 @@ class OnePointRansac {
         if (best_[static_cast<std::size_t>(f)] < 0) continue;
         const Eigen::Vector2d expected =
             prior_.mean(f) + prior_.S().block<2, 2>(2 * f, 2 * h) * weighted;
-        if (f == h || (bestPixel(f) - expected).squaredNorm() < limit2) inliers.push_back(f);
+        if (f == h || (bestPixel(f) - expected).squaredNorm() < chi2 * R[f]) inliers.push_back(f);
       }
       if (inliers.size() > most.size()) most = std::move(inliers);
     }
@@ -143,8 +144,7 @@ MatchResult OnePointRansacMatcher::match(const MeasurementPrior& given, FeatureS
   const std::vector<int> hypotheses = drawHypotheses(voters, options);
   result.statistics.nodes = static_cast<std::int64_t>(hypotheses.size());
   const OnePointRansac ransac(prior, budgeted, best);
-  const std::vector<int> inliers =
-      ransac.inliers(hypotheses, options.ransac_inlier_chi2 * given.noise_variance_px2);
+  const std::vector<int> inliers = ransac.inliers(hypotheses, options.ransac_inlier_chi2);
   result.statistics.inliers = static_cast<int>(inliers.size());
   if (!inliers.empty()) {
     const std::vector<int> rescued = ransac.rescued(inliers, gates, options.ransac_rescue_chi2);

@@ -63,6 +63,12 @@ Eigen::MatrixXd ProperPrior::wideS() const {
   return selectFeatures(prior_.wide_S, original_);
 }
 
+Eigen::VectorXd ProperPrior::noiseVariances() const {
+  Eigen::VectorXd variances(size());
+  for (int f = 0; f < size(); ++f) variances[f] = prior_.noiseVariance_px2(original(f));
+  return variances;
+}
+
 void ProperPrior::leaveOutDependent() { take(independentFeatures(*S_)); }
 
 void ProperPrior::leaveOut(int feature) {

@@ -24,6 +24,8 @@ class ProperPrior {
   const Eigen::MatrixXd& S() const { return *S_; }
   /// Of the prior's wide Gaussian, made anew; without rows when it has none.
   Eigen::MatrixXd wideS() const;
+  /// Of R, by feature [px^2].
+  Eigen::VectorXd noiseVariances() const;
   double wideProbability() const { return prior_.wide_probability; }
   Eigen::Vector2d mean(int feature) const { return z_->segment<2>(2 * feature); }
   Eigen::Matrix2d covariance(int feature) const {

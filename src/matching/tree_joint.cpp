@@ -19,8 +19,8 @@ Eigen::VectorXd determinantsOf(const std::vector<Eigen::Matrix2d>& blocks) {
 
 class TreeJoint : public Joint {
  public:
-  TreeJoint(const ChowLiuTree& tree, double noise_variance)
-      : Joint(Eigen::Matrix2d::Identity() * noise_variance, determinantsOf(treePrecision(tree))),
+  TreeJoint(const ChowLiuTree& tree, const Eigen::VectorXd& noise_variances)
+      : Joint(noise_variances, determinantsOf(treePrecision(tree))),
         neighbours_(tree.marginals.size()) {
     auto prior = std::make_shared<TreeConditional>();
     marginalsOf(*prior).resize(tree.marginals.size());
@@ -93,8 +93,9 @@ class TreeJoint : public Joint {
 
 }  // namespace
 
-std::unique_ptr<Joint> makeTreeJoint(const ChowLiuTree& tree, double noise_variance) {
-  return std::make_unique<TreeJoint>(tree, noise_variance);
+std::unique_ptr<Joint> makeTreeJoint(const ChowLiuTree& tree,
+                                     const Eigen::VectorXd& noise_variances) {
+  return std::make_unique<TreeJoint>(tree, noise_variances);
 }
 
 }  // namespace active_matching_slam

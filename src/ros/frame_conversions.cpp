@@ -31,11 +31,16 @@ ams_msgs::Feature toFeatureMsg(const TrackedFeature& feature, double information
     fillRowMajor(feature.predicted_px, &message.predicted_px);
     fillRowMajor(feature.innovation_covariance_px2, &message.innovation_covariance);
     message.information_bits = finiteOrZero(information_bits);
+    message.camera_bits = finiteOrZero(feature.camera_bits);
+    message.state_bits = finiteOrZero(feature.state_bits);
   }
   if (feature.status == FeatureStatus::kMatched || feature.status == FeatureStatus::kRejected) {
     fillRowMajor(feature.matched_px, &message.matched_px);
     message.score = static_cast<float>(finiteOrZero(feature.score));
   }
+  message.true_positive_rate = feature.rates.true_positive;
+  message.false_positive_rate = feature.rates.false_positive;
+  message.gate_sigma_px = finiteOrZero(feature.gate_sigma_px);
   message.attempts = feature.attempts;
   message.successes = feature.successes;
   message.submap = submap;
@@ -108,6 +113,10 @@ ams_msgs::MatchingStatistics toStatisticsMsg(const TrackedFrame& frame,
   message.cut_short = matching.cut_short;
   message.information_bits_start = finiteOrZero(matching.information_bits_start);
   message.information_bits_left = finiteOrZero(matching.information_bits_end);
+  message.camera_bits = finiteOrZero(frame.camera_bits);
+  message.state_bits_left = finiteOrZero(frame.state_bits_left);
+  message.camera_bits_per_ms = finiteOrZero(cameraBitsPerMillisecond(frame));
+  message.tree_divergence_bits = finiteOrZero(treeDivergenceBits(frame));
   message.nis = finiteOrZero(frame.nis);
   message.nis_degrees = frame.nis_degrees;
   message.quality = finiteOrZero(frame.quality);
@@ -187,13 +196,15 @@ ams_msgs::SubmapHierarchy toSubmapsMsg(const TrackedFrame& frame, const std_msgs
   message.header = header;
   if (!frame.submaps) return message;
   message.ids = frame.submaps->ids;
-  for (const SubmapLevel& level : frame.submaps->levels) {
-    ams_msgs::SubmapLevel& out = message.levels.emplace_back();
-    out.submap_of_feature.assign(level.submap_of_feature.begin(), level.submap_of_feature.end());
-    out.submaps = level.submaps;
-    out.preserved_chow_liu = finiteOrZero(level.preserved_chow_liu);
-    out.preserved_naive = finiteOrZero(level.preserved_naive);
-  }
+  const auto fill = [](const SubmapLevel& level, ams_msgs::SubmapLevel* out) {
+    out->submap_of_feature.assign(level.submap_of_feature.begin(), level.submap_of_feature.end());
+    out->submaps = level.submaps;
+    out->preserved_chow_liu = finiteOrZero(level.preserved_chow_liu);
+    out->preserved_naive = finiteOrZero(level.preserved_naive);
+  };
+  for (const SubmapLevel& level : frame.submaps->levels)
+    fill(level, &message.levels.emplace_back());
+  fill(frame.submaps->requested, &message.requested);
   return message;
 }
 

@@ -79,6 +79,12 @@ void keepWithin(HarmonicSum& sum, double low, double high) {
   if (factor < 1.0) sum.scale(factor);
 }
 
+/// Of a circle to the right; the largest within reach where there is no way round.
+double loopRadius_m(const Stage& stage) {
+  if (stage.loop_radius_m > 0.0) return stage.loop_radius_m;
+  return std::min({0.5 * stage.reach_max_m.x(), stage.reach_max_m.z(), -stage.reach_min_m.z()});
+}
+
 Motion::Components components(const std::string& name, const Stage& stage, Random& random) {
   Motion::Components c;
   const double size = stage.size_m;
@@ -107,6 +113,18 @@ Motion::Components components(const std::string& name, const Stage& stage, Rando
     c[kY].add(radius, rate, 0.5 * M_PI);
     c[kYaw].add(-4.0 * kDegree, rate, 0.0);
     c[kPitch].add(4.0 * kDegree, rate, 0.5 * M_PI);
+  } else if (name == "loop") {
+    const double radius = loopRadius_m(stage);
+    const double rate = 0.9 * size / radius;
+    c[kX].add(-radius, rate, 0.5 * M_PI);
+    c[kZ].add(radius, rate, 0.0);
+    c[kYaw].addRate(rate);
+    // Looks to either side meanwhile.
+    c[kYaw].add(15.0 * kDegree, 2.0 * M_PI / 4.7, 0.0);
+    // A hand that keeps its place: what it strays must not shrink the circle.
+    addHandNoise(c[kY], 0.012 * size, 0.3, 2.0, random);
+    addHandNoise(c[kPitch], 0.012, 0.3, 2.0, random);
+    addHandNoise(c[kRoll], 0.009, 0.3, 2.0, random);
   } else if (name == "shake") {
     addHand(c, 0.1 * size, 0.45, 1.8, 4.0, random);
   }  // still: nothing moves
@@ -123,17 +141,18 @@ void HarmonicSum::startAt(double start) { constant_ += start - value(0.0); }
 
 void HarmonicSum::scale(double factor) {
   constant_ *= factor;
+  rate_ *= factor;
   for (Term& term : terms_) term.amplitude *= factor;
 }
 
 double HarmonicSum::value(double s) const {
-  double sum = constant_;
+  double sum = constant_ + rate_ * s;
   for (const Term& term : terms_) sum += term.amplitude * std::sin(term.rate * s + term.phase);
   return sum;
 }
 
 double HarmonicSum::derivative(double s) const {
-  double sum = 0.0;
+  double sum = rate_;
   for (const Term& term : terms_)
     sum += term.amplitude * term.rate * std::cos(term.rate * s + term.phase);
   return sum;
@@ -185,6 +204,7 @@ const std::vector<NamedChoice>& motionChoices() {
       {"forward", "steady move ahead and back"},
       {"sweep", "slow move ahead and back, looking ever farther to one side and the other"},
       {"circle", "a circle every 6 s, looking at its middle"},
+      {"loop", "a walk round in a circle, to the right, looking ahead and to either side"},
       {"still", "a camera that does not move"},
       {"shake", "vibration at 2 to 4 Hz in one place"},
   };
@@ -196,8 +216,10 @@ Motion createMotion(const std::string& name, const Stage& stage, std::uint64_t s
   Random random = Random(seed).fork(0x4D4F5645);
   Motion::Components c = components(name, stage, random);
   for (HarmonicSum& component : c) component.startAt(0.0);
+  const bool has_way = name == "loop" && stage.loop_radius_m > 0.0;
   for (int axis : {kX, kY, kZ})
-    keepWithin(c[axis], stage.reach_min_m[axis], stage.reach_max_m[axis]);
+    if (!has_way || axis == kY)
+      keepWithin(c[axis], stage.reach_min_m[axis], stage.reach_max_m[axis]);
   return Motion(stage.T_world_start, c);
 }
 

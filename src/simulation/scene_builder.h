@@ -104,6 +104,8 @@ Scene makeCheckerboard(std::uint64_t seed);
 Scene makeTwoDepths(std::uint64_t seed);
 Scene makeCorridor(std::uint64_t seed);
 Scene makeCorridorEnd(std::uint64_t seed);
+Scene makeCorridorLoop(std::uint64_t seed);
+Scene makeRooms(std::uint64_t seed);
 Scene makeWall(std::uint64_t seed);
 Scene makeWalkway(std::uint64_t seed);
 

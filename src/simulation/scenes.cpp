@@ -14,6 +14,8 @@ const std::vector<NamedChoice>& sceneChoices() {
       {"two_depths", "a table with boxes in front of a wall far behind"},
       {"corridor", "two long walls with posters and doors"},
       {"corridor_end", "two walls with posters, nothing on the wall ahead"},
+      {"corridor_loop", "a corridor round a block, for the motion loop"},
+      {"rooms", "four rooms alike in a ring of doors, for the motion loop"},
       {"wall", "one long wall, for moving sideways"},
   };
   return choices;
@@ -29,6 +31,8 @@ Scene createScene(const std::string& name, std::uint64_t seed) {
   if (name == "two_depths") return makeTwoDepths(seed);
   if (name == "corridor") return makeCorridor(seed);
   if (name == "corridor_end") return makeCorridorEnd(seed);
+  if (name == "corridor_loop") return makeCorridorLoop(seed);
+  if (name == "rooms") return makeRooms(seed);
   return makeWall(seed);
 }
 

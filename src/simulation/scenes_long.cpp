@@ -62,6 +62,110 @@ Scene makeCorridorEnd(std::uint64_t seed) {
   return b.finish();
 }
 
+Scene makeCorridorLoop(std::uint64_t seed) {
+  SceneBuilder b("corridor_loop", seed);
+  constexpr double kHalf = 6.0, kInner = 4.0, kRadius = 5.0, kHeight = 2.6;
+  b.scene().ambient = 0.7;
+  b.scene().light_grid_m = 0.25;
+  b.density(110);
+  b.room({-kHalf, -kHalf, 0.0}, {kHalf, kHalf, kHeight},
+         [](const Canvas& c) { return paintTiles(c, 0.4, 0.42); }, plaster(0.8),
+         {paintBricks, plaster(0.66), plaster(0.7), plaster(0.62)});
+  b.prism({0.0, 0.0, 0.0}, kInner, kHeight, 12, plaster(0.6), plain(0.5));
+  b.density(300);
+  // On the outer walls, and on the twelve sides of the inner one.
+  for (int wall = 0; wall < 4; ++wall) {
+    const double facing = 0.5 * M_PI * wall;  // the wall stands where this points from
+    const Eigen::Rotation2Dd turn(facing);
+    for (double along = -5.2; along < 5.3; along += b.random().uniform(0.9, 1.3)) {
+      const Eigen::Vector2d at = turn * Eigen::Vector2d(-(kHalf - 0.005), along);
+      const double u = b.random().uniform();
+      const Paint paint = u < 0.5   ? Paint(paintPoster)
+                          : u < 0.8 ? Paint(paintCorkBoard)
+                                    : paintDoor;
+      const bool is_door = u >= 0.8;
+      b.upright({at.x(), at.y(), is_door ? 1.02 : b.random().uniform(1.3, 1.7)}, facing,
+                is_door ? 0.9 : b.random().uniform(0.45, 0.8),
+                is_door ? 2.04 : b.random().uniform(0.4, 0.8), paint);
+    }
+  }
+  const double apothem = kInner * std::cos(M_PI / 12.0);
+  for (int side = 0; side < 12; ++side) {
+    const double facing = 2.0 * M_PI * (side + 0.5) / 12.0;
+    const Eigen::Rotation2Dd turn(facing);
+    for (const double along : {-0.5, 0.5}) {
+      const Eigen::Vector2d at = turn * Eigen::Vector2d(apothem + 0.005, along);
+      b.upright({at.x(), at.y(), b.random().uniform(1.2, 1.8)}, facing,
+                b.random().uniform(0.4, 0.7), b.random().uniform(0.4, 0.8),
+                b.random().uniform() < 0.7 ? Paint(paintPoster) : Paint(paintCorkBoard));
+    }
+    const Eigen::Vector2d above = turn * Eigen::Vector2d(kRadius, 0.0);
+    b.level({above.x(), above.y(), kHeight - 0.005}, facing, 0.3, 1.0, plain(0.95), false, 1.0);
+    b.lamp({above.x(), above.y(), kHeight - 0.05}, 0.5, 0.9);
+  }
+  // Once round, to the right, about a middle that lies to the right.
+  b.start({0.0, kRadius, 1.5}, 0.0, 0.05, {-0.5, -0.3, -0.5}, {0.5, 0.3, 1.5}, 1.0);
+  b.scene().stage.loop_radius_m = kRadius;
+  return b.finish();
+}
+
+Scene makeRooms(std::uint64_t seed) {
+  SceneBuilder b("rooms", seed);
+  constexpr double kHalf = 6.0, kRadius = 3.4, kHeight = 2.6, kDoor = 0.8, kLintel = 2.1,
+                   kThickness = 0.15;
+  b.scene().ambient = 0.7;
+  b.scene().light_grid_m = 0.25;
+  b.density(110);
+  b.room({-kHalf, -kHalf, 0.0}, {kHalf, kHalf, kHeight},
+         [](const Canvas& c) { return paintTiles(c, 0.5, 0.45); }, plaster(0.8),
+         {plaster(0.7), paintBricks, plaster(0.64), plaster(0.68)});
+  // Four walls from the middle, each with a door where the camera goes through.
+  for (int wall = 0; wall < 4; ++wall) {
+    const double yaw = 0.5 * M_PI * wall;
+    const Eigen::Rotation2Dd turn(yaw);
+    const auto part = [&](double from, double to, double low, double high) {
+      const Eigen::Vector2d middle = turn * Eigen::Vector2d(0.5 * (from + to), 0.0);
+      b.box({middle.x(), middle.y(), low}, yaw, {to - from, kThickness, high - low}, plaster(0.72),
+            low > 0.0);
+    };
+    part(0.0, kRadius - kDoor, 0.0, kHeight);
+    part(kRadius + kDoor, kHalf, 0.0, kHeight);
+    part(kRadius - kDoor, kRadius + kDoor, kLintel, kHeight);
+  }
+  b.density(300);
+  for (int room = 0; room < 4; ++room) {
+    const Eigen::Rotation2Dd turn(0.5 * M_PI * room);
+    const auto place = [&](double x, double y, double z) {
+      const Eigen::Vector2d at = turn * Eigen::Vector2d(x, y);
+      return Vector3d(at.x(), at.y(), z);
+    };
+    const double yaw = 0.5 * M_PI * room;
+    // Alike in all rooms but for textures and small shifts, as rooms of one building are.
+    for (double along = 0.8; along < 5.4; along += b.random().uniform(0.8, 1.2)) {
+      b.upright(place(kHalf - 0.005, along, b.random().uniform(1.2, 1.8)), yaw + M_PI,
+                b.random().uniform(0.45, 0.8), b.random().uniform(0.4, 0.8), paintPoster);
+      b.upright(place(along, kHalf - 0.005, b.random().uniform(1.2, 1.8)), yaw - 0.5 * M_PI,
+                b.random().uniform(0.45, 0.8), b.random().uniform(0.4, 0.8),
+                b.random().uniform() < 0.5 ? Paint(paintPoster) : Paint(paintCorkBoard));
+    }
+    for (const double along : {0.9, 1.8})  // on the walls between rooms, beside the doors
+      for (const double side : {1.0, -1.0})
+        b.upright(place(along, side * (0.5 * kThickness + 0.005), b.random().uniform(1.2, 1.8)),
+                  yaw + side * 0.5 * M_PI, b.random().uniform(0.4, 0.6),
+                  b.random().uniform(0.4, 0.8), paintPoster);
+    b.bookcase(place(5.0, 5.6, 0.0), yaw, 1.0, 1.9, 5);
+    b.table(place(1.3, 1.2, 0.0), yaw, {1.2, 0.8, 0.75}, 0.5);
+    b.pile(place(1.3, 1.2, 0.75), yaw + 0.3, 4, 0.3, 0.25, paintPoster);
+    b.lamp(place(2.6, 2.6, kHeight - 0.05), 0.6, 2.5);
+    b.level(place(2.6, 2.6, kHeight - 0.005), yaw, 0.6, 0.6, plain(0.95), false, 1.0);
+  }
+  const double a = 0.25 * M_PI;  // in the middle of a room, along the circle
+  b.start({kRadius * std::cos(a), kRadius * std::sin(a), 1.5}, a - 0.5 * M_PI, 0.05,
+          {-0.5, -0.3, -0.5}, {0.5, 0.3, 1.0}, 1.0);
+  b.scene().stage.loop_radius_m = kRadius;
+  return b.finish();
+}
+
 Scene makeWall(std::uint64_t seed) {
   SceneBuilder b("wall", seed);
   b.scene().ambient = 0.8;

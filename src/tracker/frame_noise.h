@@ -21,8 +21,10 @@ class FrameNoise {
   /// Ekf::predict().
   void predict(const CameraModel& camera, double interval_s, Ekf* filter);
 
-  /// Standard deviation per axis [px] that gates and matchers allow a match.
-  double gateSigma_px() const { return noise_.gateSigma_px(); }
+  /// Standard deviation per axis [px] that gates and matchers allow a match of `feature`.
+  double gateSigma_px(const MapFeature& feature) const {
+    return noise_.gateSigma_px(feature.noise);
+  }
 
   /// Sets R of the measurements of one image, which come with the sigma of their template's fit
   /// (SearchMatch::sigma_px). `is_adjusted`: whether a feature's matches take part in the bundle

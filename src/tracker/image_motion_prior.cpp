@@ -65,7 +65,8 @@ MeasurementPrior conditionOnImageMotion(
       motion.sigma_px * motion.sigma_px + kSpreadFraction * kSpreadFraction * spread;
 
   Eigen::MatrixXd P = prior.S;  // without the noise of a match
-  P.diagonal().array() -= prior.noise_variance_px2;
+  for (int i = 0; i < prior.size(); ++i)
+    P.diagonal().segment<2>(2 * i).array() -= prior.noiseVariance_px2(i);
   const Eigen::MatrixX3d PA = P * A.transpose();
   const Eigen::Matrix3d V = A * PA, noise = variance * Eigen::Matrix3d::Identity();
   MeasurementPrior conditioned = prior;
@@ -95,7 +96,9 @@ std::optional<MeasurementPrior> conditionOnFlow(
   for (std::size_t k = 0; k < tracked.size(); ++k)
     innovation.segment<2>(2 * k) = *flow_px[tracked[k]] - prior.mean(tracked[k]);
   Eigen::MatrixXd S = selectFeatures(prior.S, tracked);
-  S.diagonal().array() += sigma_px * sigma_px - prior.noise_variance_px2;
+  for (std::size_t k = 0; k < tracked.size(); ++k)
+    S.diagonal().segment<2>(2 * k).array() +=
+        sigma_px * sigma_px - prior.noiseVariance_px2(tracked[k]);
   const std::vector<int> kept = leaveOneOutInliers(innovation, S, kFlowGateChi2);
   if (2 * static_cast<int>(kept.size()) <= prior.size()) return std::nullopt;
 
@@ -105,7 +108,7 @@ std::optional<MeasurementPrior> conditionOnFlow(
   for (int k = 0; k < n / 2; ++k) {
     const int i = tracked[kept[k]];
     PA.middleCols<2>(2 * k) = prior.S.middleCols<2>(2 * i);
-    PA.block<2, 2>(2 * i, 2 * k).diagonal().array() -= prior.noise_variance_px2;
+    PA.block<2, 2>(2 * i, 2 * k).diagonal().array() -= prior.noiseVariance_px2(i);
     kept_innovation.segment<2>(2 * k) = innovation.segment<2>(2 * kept[k]);
   }
   const Eigen::LLT<Eigen::MatrixXd> factor(selectFeatures(S, kept));

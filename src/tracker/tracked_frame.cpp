@@ -3,10 +3,22 @@
 #include <algorithm>
 #include <utility>
 
+#include "active_matching_slam/information/chow_liu_tree.h"
 #include "active_matching_slam/information/gaussian_information.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
+namespace {
+
+/// Null when it has left the map by now.
+TrackedFeature* findFeature(FeatureId id, TrackedFrame* frame) {
+  const auto it =
+      std::lower_bound(frame->features.begin(), frame->features.end(), id,
+                       [](const TrackedFeature& f, FeatureId wanted) { return f.id < wanted; });
+  return it != frame->features.end() && it->id == id ? &*it : nullptr;
+}
+
+}  // namespace
 
 std::string trackingStateName(TrackingState state) {
   switch (state) {
@@ -65,6 +77,20 @@ std::unordered_map<FeatureId, double> predictedInformationBits(const TrackedFram
   return bits_of;
 }
 
+double treeDivergenceBits(const TrackedFrame& frame) {
+  if (frame.matching.tree_edges.empty()) return 0.0;
+  std::vector<WeightedEdge> edges;
+  for (const auto& [first, second] : frame.matching.tree_edges)
+    edges.push_back({first, second, pairInformationBits(frame.prior.S, first, second)});
+  return treeDivergenceBits(frame.prior.S, treeOf(frame.prior.S, std::move(edges))).value_or(0.0);
+}
+
+double cameraBitsPerMillisecond(const TrackedFrame& frame) {
+  const FrameTimings& spent = frame.timings_ms;
+  const double ms = spent.measure + spent.match + spent.update;
+  return ms > 0.0 ? frame.camera_bits / ms : 0.0;
+}
+
 /// The state of the tracker, of which every frame gives an account.
 void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->scale_source = scale_source_;
@@ -96,6 +122,8 @@ void Tracker::Implementation::describeState(TrackedFrame* frame) const {
     if (state.kind == FeatureKind::kInverseDepth)
       out.sigma_inverse_depth = filter_.sigmaInverseDepth(state);
     out.known = feature.known;
+    out.rates = feature.rates.rates({options_.matching.default_rates});
+    out.gate_sigma_px = noise_.gateSigma_px(feature);
     out.attempts = feature.attempts;
     out.successes = feature.successes;
     out.template_image = feature.patch.image;
@@ -109,6 +137,13 @@ void Tracker::Implementation::describeState(TrackedFrame* frame) const {
 /// What was predicted, searched and matched. After describeState().
 void Tracker::Implementation::describeMatches(FrameState current, TrackedFrame* frame) {
   frame->matching = std::move(current.matching);
+  frame->state_bits_left = current.bits_left;
+  for (std::size_t i = 0; i < current.visible.size(); ++i) {
+    TrackedFeature* feature = findFeature(current.visible[i].id, frame);
+    if (!feature) continue;
+    feature->camera_bits = current.visible_bits[i];
+    feature->state_bits = current.visible_state_bits[i];
+  }
   if (current.prior.size() == 0) return;
   frame->prior = std::move(current.prior);
   frame->templates = std::move(current.templates);
@@ -118,11 +153,8 @@ void Tracker::Implementation::describeMatches(FrameState current, TrackedFrame* 
     const bool used = next < current.inliers.size() && current.inliers[next] == i;
     const Eigen::Vector2d pixel =
         used ? current.measurements[next++].pixel : Eigen::Vector2d::Zero();
-    const FeatureId id = frame->prior.ids[i];
-    const auto it =
-        std::lower_bound(frame->features.begin(), frame->features.end(), id,
-                         [](const TrackedFeature& f, FeatureId id) { return f.id < id; });
-    if (it == frame->features.end() || it->id != id) continue;  // retired by now
+    TrackedFeature* it = findFeature(frame->prior.ids[i], frame);
+    if (!it) continue;
     it->predicted_px = frame->prior.mean(i);
     it->innovation_covariance_px2 = frame->prior.covariance(i);
     const auto& matches = frame->matches[i];

@@ -83,7 +83,7 @@ class Tracker::Implementation {
   void findScale(TrackedFrame* frame);
   void rescale(double factor);
   FrameState measure(const cv::Mat& image, double interval_s) const;
-  std::vector<VisibleFeature> visibleFeatures() const;
+  std::vector<VisibleFeature> visibleFeatures(std::vector<FeatureId>* behind_mask = nullptr) const;
   void chooseCandidates(FrameState* current) const;
   void predictMeasurements(FrameState* current) const;
   void correct(FrameState* current, TrackedFrame* frame);
@@ -111,6 +111,7 @@ class Tracker::Implementation {
   void maintainMap(const cv::Mat& image, TrackedFrame* frame);
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
+  std::vector<FeatureId> leastInformative(int count) const;
   void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);

@@ -274,6 +274,7 @@ void Tracker::Implementation::saveMap(const std::string& path) const {
   content.map = map_.features();
   content.next_id = filter_.nextId();
   content.scale_source = static_cast<int>(scale_source_);
+  content.graph = structure_.graph();
   content.template_size_px = options_.image.template_size_px;
   content.source_patch_size_px = options_.image.source_patch_size_px;
   writeMapFile(path, content);
@@ -296,7 +297,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   for (const MapFeature& feature : content.map) map_.add(feature);
   scale_source_ = static_cast<ScaleSource>(content.scale_source);
   scale_finder_.reset();
-  structure_.clear();
+  structure_.restore(content.graph);
   structure_snapshot_ = {};
   lost_maps_.clear();
   awaits_loaded_map_ = true;

@@ -13,7 +13,8 @@ namespace {
 constexpr int kMaximumStartsPerFrame = 12;
 /// Tree and submaps of a map of more features are made anew only every so many frames. Cost: they
 /// take the square of the number of features.
-constexpr int kLargeMap = 60, kLargeMapSnapshotFrames = 5;
+constexpr std::size_t kLargeMap = 60;
+constexpr int kLargeMapSnapshotFrames = 5;
 /// Relative standard deviation of an inverse depth below which it counts as known. Derivation:
 /// infinity is five sigma away.
 constexpr double kKnownDepthSigma = 0.2;
@@ -37,7 +38,7 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   retire(map_.drifting(), frame);
   frame->features_failed = frame->features_retired;
   // The maximum may have been lowered.
-  retire(map_.leastUseful(filter_, map_.size() - options_.map.maximum_features), frame);
+  retire(leastInformative(map_.size() - options_.map.maximum_features), frame);
   if (poor_frames_ > 0) return;  // where the camera is unsure, nothing new is put on the map
   const std::vector<VisibleFeature> visible = visibleFeatures();
   const int wanted =
@@ -45,9 +46,15 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   if (wanted <= 0) return;
   const int excess =
       map_.size() + std::min(wanted, kMaximumStartsPerFrame) - options_.map.maximum_features;
-  if (excess > 0) retire(map_.leastUseful(filter_, excess), frame);
+  if (excess > 0) retire(leastInformative(excess), frame);
   frame->features_started +=
       startFeatures(image, visible, std::min(wanted, kMaximumStartsPerFrame), frame);
+}
+
+/// Features to make room in a full map.
+std::vector<FeatureId> Tracker::Implementation::leastInformative(int count) const {
+  return options_.map.retire_by_information ? map_.leastInformative(count)
+                                            : map_.leastUseful(filter_, count);
 }
 
 /// Takes the source patches anew of features that have grown or shrunk half way to where they can't
@@ -90,15 +97,16 @@ void Tracker::Implementation::observeStructure(const std::vector<VisibleFeature>
   structure_.addFrame(predicted.ids, predicted.S);
 }
 
-/// Forgets what has left the map. The tree and the submaps of a large map are made anew every few
-/// frames only.
+/// What has left the map stays in the graph, as far as there is room. The tree and the submaps of a
+/// large map are made anew every few frames only.
 void Tracker::Implementation::updateStructure(TrackedFrame* frame) {
   std::vector<FeatureId> ids;
   for (const MapFeature& feature : map_.features()) ids.push_back(feature.id);
-  structure_.keepOnly(ids);
-  const bool is_large = map_.size() > kLargeMap;
+  structure_.forgetWeakest(ids, options_.submaps.kept_features);
+  const bool is_large =
+      structure_snapshot_.graph && structure_snapshot_.graph->ids.size() > kLargeMap;
   if (!structure_snapshot_.graph || !is_large || frame->index % kLargeMapSnapshotFrames == 0)
-    structure_snapshot_ = structure_.snapshot();
+    structure_snapshot_ = structure_.snapshot(options_.submaps);
   frame->graph = structure_snapshot_.graph;
   frame->submaps = structure_snapshot_.submaps;
 }

@@ -1,9 +1,11 @@
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/image/warp.h"
+#include "feature_choice.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
@@ -12,6 +14,17 @@ namespace {
 /// Fraction of its velocity that a camera keeps from one frame with too few matches to the next: a
 /// hand that jerks does not go on for long.
 constexpr double kVelocityDecay = 0.7;
+
+/// 1/2 log2 |before| / |after| [bit]; 0 where one of them is singular.
+double informationGained(const MotionCovariance& before, const MotionCovariance& after) {
+  const Eigen::LLT<MotionCovariance> a(before), b(after);
+  if (a.info() != Eigen::Success || b.info() != Eigen::Success) return 0.0;
+  const auto log2Root = [](const Eigen::LLT<MotionCovariance>& factor) {
+    return MotionCovariance(factor.matrixL()).diagonal().array().log2().sum();
+  };
+  const double bits = log2Root(a) - log2Root(b);
+  return std::isfinite(bits) ? std::max(bits, 0.0) : 0.0;
+}
 
 }  // namespace
 
@@ -36,11 +49,15 @@ void Tracker::Implementation::predict(double interval_s) {
 }
 
 /// Features that should be seen in the part of the image that is used.
-std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures() const {
+/// `behind_mask`: also those in the other part, ascending; null: not asked for.
+std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures(
+    std::vector<FeatureId>* behind_mask) const {
   std::vector<VisibleFeature> visible =
       map_.visible(filter_, camera_, options_.map, options_.image.border_px);
-  const auto is_masked = [this](const VisibleFeature& feature) {
-    return !mask_.isSearched(feature.view.pixel);
+  const auto is_masked = [&](const VisibleFeature& feature) {
+    const bool is_behind = !mask_.isSearched(feature.view.pixel);
+    if (is_behind && behind_mask) behind_mask->push_back(feature.id);
+    return is_behind;
   };
   visible.erase(std::remove_if(visible.begin(), visible.end(), is_masked), visible.end());
   return visible;
@@ -48,10 +65,16 @@ std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures() const {
 
 /// Features that should be seen and the templates to search them by.
 void Tracker::Implementation::chooseCandidates(FrameState* current) const {
-  current->visible = visibleFeatures();
-  auto chosen = map_.choose(current->visible, camera_, options_.map.features_per_frame);
+  current->visible = visibleFeatures(&current->behind_mask);
+  FeatureChoice choice =
+      chooseFeatures(filter_, camera_, map_, noise_, current->visible,
+                     {options_.map.features_per_frame, options_.map.choose_by_information,
+                      options_.matching.stop_bits});
+  current->visible_bits = std::move(choice.bits_of_visible);
+  current->visible_state_bits = std::move(choice.state_bits_of_visible);
+  current->bits_left = choice.bits_left;
   const Eigen::Isometry3d T_world_camera = filter_.camera().poseWorldCamera();
-  for (VisibleFeature& feature : chosen) {
+  for (VisibleFeature& feature : choice.chosen) {
     const SourcePatch& patch = map_.find(feature.id)->patch;
     Template expected;
     if (!bendView(patch, camera_, T_world_camera, homogeneousPosition(*filter_.find(feature.id)),
@@ -68,13 +91,18 @@ void Tracker::Implementation::chooseCandidates(FrameState* current) const {
 void Tracker::Implementation::predictMeasurements(FrameState* current) const {
   std::vector<FeatureId> ids;
   for (const VisibleFeature& feature : current->candidates) ids.push_back(feature.id);
-  const double sigma_px = noise_.gateSigma_px();
+  const double sigma_px = noise_.gateSigma_px(MapFeature());
   PredictedMeasurements predicted = filter_.predictMeasurements(camera_, ids, sigma_px);
   MeasurementPrior& prior = current->prior;
   prior.ids = std::move(predicted.ids);
   prior.z = std::move(predicted.z);
   prior.S = std::move(predicted.S);
   prior.noise_variance_px2 = sigma_px * sigma_px;
+  for (int i = 0; i < prior.size(); ++i) {
+    const double own_px = noise_.gateSigma_px(*map_.find(prior.ids[i]));
+    prior.noise_variances_px2.push_back(own_px * own_px);
+    prior.S.diagonal().segment<2>(2 * i).array() += own_px * own_px - sigma_px * sigma_px;
+  }
   const auto impulse = motion_ ? filter_.impulse() : std::nullopt;
   const Eigen::Matrix<double, 6, 1> jerk =
       widestImpulse() -
@@ -141,14 +169,20 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   // While depths are guessed, residuals are due to these, not to noise: R is taken as known.
   const bool are_depths_guessed = initialiser_.areDepthsGuessed();
   const NoisePrior prior = are_depths_guessed ? NoisePrior() : noise_.prior();
+  const MotionCovariance predicted = filter_.cameraCovariance();
   const UpdateReport report = filter_.update(camera_, current->measurements, prior, corrected());
+  frame->camera_bits = informationGained(predicted, filter_.cameraCovariance());
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
 
   motion_noise_.countImage(current->is_jerk);
   if (!are_depths_guessed) learnMotion(report, allowed, current->is_jerk);
   if (!are_depths_guessed) noise_.learn(report, current->measurements, &map_);
-  if (options_.mapping) learnSlopes(*current);
+  if (options_.mapping) {
+    learnSlopes(*current);
+    map_.recordInformation(current->visible, current->visible_bits, current->behind_mask,
+                           current->interval_s);
+  }
   recordSearches(*current, frame->index);
   if (!are_depths_guessed && !frame->repeated_image) judgeQuality(*current);
 }

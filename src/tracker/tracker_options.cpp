@@ -86,6 +86,7 @@ void checkTrackerOptions(const TrackerOptions& options) {
   checkMapOptions(options.map);
   checkMotionOptions(options.motion);
   checkTarget(options.target);
+  checkSubmapOptions(options.submaps);
   if (!options.known_points.empty() && options.known_points.size() < kFewestKnownPoints)
     throw std::invalid_argument("known points: " + std::to_string(options.known_points.size()) +
                                 " given, a start needs at least " +

@@ -239,8 +239,8 @@ std::string statusText(const TrackedFrame& frame) {
   if (frame.state != TrackingState::kTracking)
     return trackingStateName(frame.state) + ": " + frame.reason;
   char numbers[160];
-  std::snprintf(numbers, sizeof numbers, "  %d/%d matched  %s of %s px  %.1f ms", s.matched,
-                s.candidates, shortCount(s.pixels_searched).c_str(),
+  std::snprintf(numbers, sizeof numbers, "  %d/%d matched  %.0f bits  %s of %s px  %.1f ms",
+                s.matched, s.candidates, frame.camera_bits, shortCount(s.pixels_searched).c_str(),
                 shortCount(s.pixels_full_gates).c_str(), frame.timings_ms.total);
   const std::string scale = frame.scale_source == ScaleSource::kFree ? "  scale free" : "";
   return trackingStateName(frame.state) + "  " + s.matcher + numbers + scale;

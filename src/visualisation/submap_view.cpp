@@ -11,7 +11,9 @@ std::vector<int> submapsAtLevel(const TrackedFrame& frame, int level) {
   std::vector<int> submaps;
   submaps.reserve(frame.features.size());
   const int last = static_cast<int>(frame.submaps->levels.size()) - 1;
-  const SubmapLevel& chosen = frame.submaps->levels[std::clamp(level, 0, last)];
+  const SubmapLevel& chosen = frame.submaps->requested.submaps > 0
+                                  ? frame.submaps->requested
+                                  : frame.submaps->levels[std::clamp(level, 0, last)];
   std::unordered_map<std::int64_t, int> submap_of_id;
   const std::size_t count = std::min(frame.submaps->ids.size(), chosen.submap_of_feature.size());
   for (std::size_t i = 0; i < count; ++i)

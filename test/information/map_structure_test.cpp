@@ -25,7 +25,7 @@ TEST(MapStructure, SnapshotsAreTheGraphItsTreeAndItsHierarchy) {
   EXPECT_EQ(in_tree, 4);
   EXPECT_EQ(snapshot.submaps->levels.back().submaps, 1);
 
-  structure.keepOnly({1, 9, 7});
+  structure.forgetWeakest({1, 9, 7}, 0);
   EXPECT_EQ(structure.snapshot().submaps->ids, (std::vector<std::int64_t>{1, 7, 9}));
   EXPECT_EQ(snapshot.graph->ids.size(), 5u);  // what was handed out stays as it was
 

@@ -89,13 +89,47 @@ TEST(MutualInformationAccumulator, RemovedFeaturesLeaveWithTheirLinks) {
     EXPECT_NE(link.first, 12);
     EXPECT_NE(link.second, 12);
   }
-  accumulator.keepOnly({14, 10, 500});
+  accumulator.forgetWeakest({14, 10, 500}, 0);
   graph = accumulator.links();
   EXPECT_EQ(graph.ids, (std::vector<std::int64_t>{10, 14}));
   ASSERT_EQ(graph.links.size(), 1u);
   EXPECT_NEAR(graph.links[0].information_bits, pairInformationBits(S, 0, 4), 1e-12);
   accumulator.clear();
   EXPECT_TRUE(accumulator.links().ids.empty());
+}
+
+TEST(MutualInformationAccumulator, OfWhatHasLeftTheMapTheWeakestIsForgottenFirst) {
+  constexpr int kFeatures = 12, kKept = 4;
+  MutualInformationAccumulator accumulator;
+  std::vector<std::int64_t> ids(kFeatures);
+  for (int i = 0; i < kFeatures; ++i) ids[i] = 100 + i;
+  accumulator.addFrame(ids, randomMeasurementCovariance(kFeatures, 3));
+  const MutualInformationGraph before = accumulator.links();
+  std::map<std::int64_t, double> bits;
+  for (const InformationLink& link : before.links) {
+    bits[link.first] += link.information_bits;
+    bits[link.second] += link.information_bits;
+  }
+  const std::vector<std::int64_t> in_map = {111, 100, 105};
+  accumulator.forgetWeakest(in_map, kFeatures);
+  EXPECT_EQ(accumulator.links().ids, before.ids);
+  accumulator.forgetWeakest(in_map, kKept);
+  const MutualInformationGraph after = accumulator.links();
+  ASSERT_EQ(after.ids.size(), in_map.size() + kKept);
+  const auto isKept = [&](std::int64_t id) {
+    return std::binary_search(after.ids.begin(), after.ids.end(), id);
+  };
+  double weakest_kept = std::numeric_limits<double>::infinity(), strongest_gone = 0.0;
+  for (const std::int64_t id : ids) {
+    if (std::find(in_map.begin(), in_map.end(), id) != in_map.end()) {
+      EXPECT_TRUE(isKept(id));
+    } else if (isKept(id)) {
+      weakest_kept = std::min(weakest_kept, bits[id]);
+    } else {
+      strongest_gone = std::max(strongest_gone, bits[id]);
+    }
+  }
+  EXPECT_GT(weakest_kept, strongest_gone);
 }
 
 TEST(MutualInformationAccumulator, AnUnusableFeatureDoesNotCountAsSeen) {

@@ -357,6 +357,27 @@ TEST(FeatureMap, MovesFirstViewsByTheImageTheyWereTakenIn) {
   EXPECT_TRUE(world.map.find(id)->patch.T_world_camera.translation().isApprox(Vector3d(0, 2, 3)));
 }
 
+TEST(FeatureMap, ThoseThatToldLeastOfTheCameraLeaveFirst) {
+  World world;
+  const FeatureId often = world.add({0, 0, 2}), seldom = world.add({0.1, 0, 2}),
+                  gone = world.add({0, 0, -2});
+  world.add({0.2, 0, 2}, Isometry3d::Identity(), true);
+  EXPECT_TRUE(world.map.leastInformative(3).empty()) << "nothing is known of them yet";
+  world.map.recordInformation({{often, {}}, {seldom, {}}, {gone, {}}}, {2.0, 1.0, 9.0}, {}, 0.1);
+  EXPECT_EQ(world.map.leastInformative(1), std::vector<FeatureId>{seldom});
+  for (int frame = 0; frame < 200; ++frame)
+    world.map.recordInformation({{often, {}}, {seldom, {}}}, {2.0, 1.0}, {}, 0.1);
+  EXPECT_EQ(world.map.leastInformative(9), (std::vector<FeatureId>{gone, seldom, often}))
+      << "what was out of view for long goes first, and a known one never";
+  EXPECT_TRUE(world.map.leastInformative(-1).empty());
+  for (int frame = 0; frame < 200; ++frame)
+    world.map.recordInformation({{seldom, {}}}, {1.0}, {often}, 0.1);
+  EXPECT_EQ(world.map.leastInformative(9), (std::vector<FeatureId>{gone, seldom}))
+      << "nothing is known of what is behind a mask";
+  world.map.recordInformation({{seldom, {}}}, {1.0}, {}, 0.1);
+  EXPECT_EQ(world.map.leastInformative(9).back(), often) << "it was not forgotten there";
+}
+
 TEST(FeatureMap, LeavesFirstWhatIsFurthestFromTheView) {
   World world;
   const FeatureId ahead = world.add({0, 0, 2});

@@ -109,7 +109,9 @@ void seal(std::string* bytes) {
 }
 
 TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
-  const MapFileContent written = smallMap();
+  MapFileContent written = smallMap();
+  written.graph.ids = {1, 2, 17};  // 17 has left the map
+  written.graph.links = {{1, 2, 0.75, 4, false}, {2, 17, 1.0 / 3.0, 9, false}};
   writeMapFile(path_, written);
   writeMapFile(path_, written);  // over the old one
   const MapFileContent read = readMapFile(path_);
@@ -134,7 +136,20 @@ TEST_F(MapFile, ReadsBackWhatWasWrittenBitForBit) {
     EXPECT_EQ(read.map[i].patch.slope_per_px, written.map[i].patch.slope_per_px);
     EXPECT_EQ(read.map[i].patch.slope_information_px2, written.map[i].patch.slope_information_px2);
   }
+  EXPECT_EQ(read.graph.ids, written.graph.ids);
+  ASSERT_EQ(read.graph.links.size(), 2u);
+  EXPECT_EQ(read.graph.links[1].information_bits, 1.0 / 3.0);
+  EXPECT_EQ(read.graph.links[1].frames, 9);
   EXPECT_EQ(serializeMap(read), serializeMap(written));
+}
+
+TEST_F(MapFile, RefusesAGraphThatDoesNotFitTogether) {
+  MapFileContent content = smallMap();
+  content.graph.ids = {1, 2};
+  content.graph.links = {{1, 5, 0.5, 3, false}};
+  EXPECT_THROW(serializeMap(content), std::invalid_argument);
+  content.graph.links = {{1, 2, -0.5, 3, false}};
+  EXPECT_THROW(serializeMap(content), std::invalid_argument);
 }
 
 TEST_F(MapFile, AnAnchorAtTheOriginStaysThere) {
@@ -230,8 +245,8 @@ TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
   bytes[bytes.size() / 2] ^= 1;
   expectRefused(bytes, "damaged");
   bytes = serializeMap(smallMap());
-  setNumber(&bytes, 8, 5, 4);
-  expectRefused(bytes, "version 5");
+  setNumber(&bytes, 8, 6, 4);
+  expectRefused(bytes, "version 6");
   bytes = serializeMap(smallMap());
   double infinity = std::numeric_limits<double>::infinity();
   std::memcpy(&bytes[bytes.size() - 8], &infinity, 8);
@@ -272,9 +287,19 @@ TEST_F(MapFile, RefusesASlopeThatIsNone) {
   expectSlopeRefused(slope, indefinite);
 }
 
+/// What version 4 would have written of a map without a graph.
+std::string version4Of(const MapFileContent& content) {
+  std::string bytes = serializeMap(content);
+  const auto n = static_cast<std::size_t>(content.covariance.rows());
+  const std::size_t counts = 2 * 8;  // of features and links in the graph
+  bytes.erase(bytes.size() - 8 * (n * (n + 1) / 2) - counts, counts);
+  setNumber(&bytes, 8, 4, 4);
+  return bytes;
+}
+
 /// What version 2 would have written: no slopes.
 std::string version2Of(const MapFileContent& content) {
-  std::string bytes = serializeMap(content);
+  std::string bytes = version4Of(content);
   for (const MapFeature& feature : content.map) {
     std::string side(8, 0);
     setNumber(&side, 0, static_cast<std::uint64_t>(feature.patch.image.rows), 8);
@@ -286,11 +311,14 @@ std::string version2Of(const MapFileContent& content) {
   return bytes;
 }
 
-TEST_F(MapFile, AMapOfVersion3IsReadAsItIs) {
-  const std::string bytes = serializeMap(smallMap());  // without anchors at the origin the same
-  std::string old = bytes;
-  setNumber(&old, 8, 3, 4);
-  EXPECT_EQ(serializeMap(parseMap(old)), bytes);
+TEST_F(MapFile, MapsOfVersions3And4AreReadAsTheyAre) {
+  const std::string bytes = serializeMap(smallMap());
+  std::string old = version4Of(smallMap());  // without anchors at the origin that of version 3
+  for (const std::uint64_t version : {3, 4}) {
+    setNumber(&old, 8, version, 4);
+    seal(&old);
+    EXPECT_EQ(serializeMap(parseMap(old)), bytes);
+  }
 }
 
 TEST_F(MapFile, AMapOfVersion2IsReadAndItsSurfacesFaceTheirFirstCameras) {

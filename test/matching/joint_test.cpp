@@ -78,7 +78,8 @@ void expectPlainConditionals(const Joint& joint, const Eigen::MatrixXd& S) {
 TEST(DenseJoint, ConditionsAsThePlainFormulas) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const Eigen::MatrixXd S = covarianceOf(12, seed);
-    expectPlainConditionals(*makeDenseJoint(S, featureInformation(S).precision_determinant, 1.0),
+    expectPlainConditionals(*makeDenseJoint(S, featureInformation(S).precision_determinant,
+                                            Eigen::VectorXd::Ones(S.rows() / 2)),
                             S);
   }
 }
@@ -86,7 +87,8 @@ TEST(DenseJoint, ConditionsAsThePlainFormulas) {
 TEST(TreeJoint, ConditionsAsThePlainFormulasOnTheTreesCovariance) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const ChowLiuTree tree = chowLiuTree(covarianceOf(12, seed));
-    expectPlainConditionals(*makeTreeJoint(tree, 1.0), treeCovariance(tree));
+    expectPlainConditionals(*makeTreeJoint(tree, Eigen::VectorXd::Ones(tree.size())),
+                            treeCovariance(tree));
   }
 }
 
@@ -94,11 +96,23 @@ TEST(TreeJoint, TouchesOnlyTheSubtreeOfTheMeasurement) {
   // A chain 0 - 1 - 2 - 3: measuring 1 parts 0 from the rest.
   const Eigen::MatrixXd S = covarianceOf(4, 4);
   const ChowLiuTree chain = treeOf(S, {{0, 1, 1.0}, {1, 2, 1.0}, {2, 3, 1.0}});
-  const auto joint = makeTreeJoint(chain, 1.0);
+  const auto joint = makeTreeJoint(chain, Eigen::VectorXd::Ones(chain.size()));
   const auto one = joint->measure(joint->prior(), 1);
   EXPECT_EQ(3u, one->touched().size());
   EXPECT_EQ(std::vector<int>{}, joint->measure(one, 0)->touched());
   EXPECT_EQ(std::vector<int>{3}, joint->measure(one, 2)->touched());
+}
+
+TEST(DenseJoint, AMeasuredFeatureIsKnownToItsOwnNoise) {
+  const Eigen::MatrixXd S = covarianceOf(3, 5);
+  const Eigen::Vector3d noise_variances(0.3, 2.0, 7.0);
+  const auto dense =
+      makeDenseJoint(S, featureInformation(S).precision_determinant, noise_variances);
+  const auto tree = makeTreeJoint(chowLiuTree(S), noise_variances);
+  for (const Joint* joint : {dense.get(), tree.get()})
+    for (int f = 0; f < 3; ++f)
+      EXPECT_EQ(joint->measure(joint->prior(), f)->marginal(f).covariance,
+                noise_variances[f] * Eigen::Matrix2d::Identity());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 namespace active_matching_slam {
@@ -69,10 +70,26 @@ TEST_P(EveryMotion, IsTheSameForTheSameSeed) {
 
 INSTANTIATE_TEST_SUITE_P(Motions, EveryMotion,
                          ::testing::Values("slow", "jerky", "sideways", "forward", "sweep",
-                                           "circle", "still", "shake"),
+                                           "circle", "still", "shake", "loop"),
                          [](const auto& info) { return info.param; });
 
-TEST(Motions, EveryListedNameIsTested) { EXPECT_EQ(motionChoices().size(), 8u); }
+TEST(Motions, EveryListedNameIsTested) { EXPECT_EQ(motionChoices().size(), 9u); }
+
+TEST(Motions, ALoopGoesRoundItsMiddleLookingAlong) {
+  Stage stage = wideStage();
+  stage.loop_radius_m = 5.0;
+  const Motion motion = createMotion("loop", stage, 2);
+  double turned = 0.0;
+  for (double t = 2.0; t < 40.0; t += 0.1) {
+    const MotionSample sample = motion.at(t);
+    const Vector3d p = stage.T_world_start.inverse() * sample.T_world_camera.translation();
+    EXPECT_NEAR(std::hypot(p.x() - 5.0, p.z()), 5.0, 1e-9);
+    const Vector3d ahead = sample.T_world_camera.linear().col(2);
+    EXPECT_GT(ahead.dot(sample.velocity_world.normalized()), 0.9);
+    turned += 0.1 * sample.angular_velocity_camera.y();
+  }
+  EXPECT_GT(turned, 2.0 * M_PI) << "more than once round";
+}
 
 TEST(Motions, SlowComesBackToTheStart) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -143,8 +160,8 @@ TEST(Motions, AnUnknownNameIsRefusedWithTheList) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(
         error.what(),
-        "motion = 'sprint' is not one of slow, jerky, sideways, forward, sweep, circle, still, "
-        "shake");
+        "motion = 'sprint' is not one of slow, jerky, sideways, forward, sweep, circle, loop, "
+        "still, shake");
   }
 }
 

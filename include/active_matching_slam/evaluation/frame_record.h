@@ -28,6 +28,8 @@ struct FrameRecord {
   LensCorrection lens;
   double nis = 0.0;
   int nis_degrees = 0;
+  double camera_bits = 0.0, state_bits_left = 0.0, camera_bits_per_ms = 0.0;  ///< TrackedFrame
+  double tree_divergence_bits = 0.0;
   int map_features = 0, map_points = 0;  ///< all, and those converted from inverse depth
   int missed = 0, rejected = 0;
   int features_started = 0, features_retired = 0, features_converted = 0, features_failed = 0;

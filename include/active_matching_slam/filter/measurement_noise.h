@@ -78,8 +78,9 @@ class MeasurementNoise {
   /// Of a typical match, at least 1.
   double inflation() const { return std::max(1.0, inflation_.scale()); }
   /// Standard deviation per axis [px] that a match to be searched for is predicted with: at most
-  /// FilterOptions::sigma_px of it is noise.
-  double gateSigma_px() const;
+  /// FilterOptions::sigma_px of it is noise. Of `landmark`, and of one like most.
+  double gateSigma_px(const LandmarkNoise& landmark) const;
+  double gateSigma_px() const { return gateSigma_px(LandmarkNoise()); }
 
   /// The same with a variance factor of 1 and without the lower bound.
   double unscaledSigma_px(const FitPrecision& fit) const;

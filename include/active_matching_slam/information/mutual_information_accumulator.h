@@ -26,8 +26,10 @@ class MutualInformationAccumulator {
 
   /// Forgets a feature and its links. An unknown id is no fault.
   void remove(std::int64_t id);
-  /// Forgets every feature that is not among `ids` (in any order).
-  void keepOnly(std::vector<std::int64_t> ids);
+  /// Forgets, of the features that are not among `ids` (in any order), all but `most`: those of the
+  /// least information with all others go first. Amortised: nothing happens before there are a
+  /// tenth more.
+  void forgetWeakest(std::vector<std::int64_t> ids, int most);
   void clear() { features_.clear(); }
 
   /// The links so far. The tree is not marked: see markTree() and buildSubmapHierarchy().

@@ -29,12 +29,19 @@ struct SubmapHierarchy {
   std::vector<std::int64_t> ids;    ///< ascending, as in the graph
   std::vector<SubmapLevel> levels;  ///< at least one
   std::vector<SubmapMerge> merges;  ///< the tree's links by level, then the strongest first
+  /// The partition that a user asked for (SubmapOptions); 0 submaps: none.
+  SubmapLevel requested;
 };
 
 /// Builds the hierarchy over all links of the graph and marks the graph's tree, which is made of
 /// the same links. A level's labels are 0, 1, ... in order of each cluster's lowest id: see
 /// SubmapTracker for labels that persist. Throws as graphEdges() does.
 SubmapHierarchy buildSubmapHierarchy(MutualInformationGraph& graph);
+
+/// A partition of the hierarchy's features, with what it and the naive one preserve. `labels` per
+/// entry of ids: 0 or more and below `submaps`. Throws std::invalid_argument when they are not.
+SubmapLevel levelOfLabels(std::vector<int> labels, int submaps,
+                          const std::vector<WeightedEdge>& edges);
 
 /// Fraction of the graph's information that a partition keeps: all links inside clusters and the
 /// strongest link between each two clusters, over the sum of all links (Chli 2009, Table 6.1). 1

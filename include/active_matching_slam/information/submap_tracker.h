@@ -17,13 +17,16 @@ namespace active_matching_slam {
 /// Labels are so small numbers from 0, but not without gaps.
 class SubmapTracker {
  public:
-  /// Renames the labels of every level.
+  /// Renames the labels of every level, and of the requested partition.
   void relabel(SubmapHierarchy& hierarchy);
-  void clear() { labels_.clear(); }
+  void clear();
 
  private:
+  using Labels = std::map<std::int64_t, int>;
+
   /// Per level the label of each feature; a level that a frame lacks is remembered.
-  std::vector<std::map<std::int64_t, int>> labels_;
+  std::vector<Labels> labels_;
+  Labels requested_;
 };
 
 }  // namespace active_matching_slam

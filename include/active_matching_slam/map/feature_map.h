@@ -28,6 +28,10 @@ struct MapFeature {
   /// Innovation less the frame's median, averaged over about the last ten matches [px].
   Eigen::Vector2d drift_px = Eigen::Vector2d::Zero();
   LandmarkNoise noise;  ///< of its matches
+  /// What its match tells of the camera [bit], averaged over the last seconds; 0 in a frame in
+  /// which it is not visible. Negative: not known yet.
+  double information_bits = -1.0;
+  bool behind_mask = false;  ///< should be seen in the last image, but not in the part in use
   std::int64_t first_frame = 0;
   std::int64_t last_matched_frame = 0;
 };
@@ -100,6 +104,17 @@ class FeatureMap {
   /// Features that are no points of the scene, such as corners where something near hides something
   /// far: their matches leave the prediction always to one side, by far more than others do.
   std::vector<FeatureId> drifting() const;
+
+  /// Averages what the features that should be visible tell of the camera, `bits` of each, expected
+  /// in a frame `interval_s` after the last. Of those `behind_mask` (ascending id) nothing can be
+  /// said; the others tell nothing.
+  void recordInformation(const std::vector<VisibleFeature>& visible,
+                         const std::vector<double>& bits, const std::vector<FeatureId>& behind_mask,
+                         double interval_s);
+
+  /// The `count` features of least MapFeature::information_bits. Never a known one, nor one of
+  /// which they are not known: yet, or because it is behind the mask.
+  std::vector<FeatureId> leastInformative(int count) const;
 
   /// The `count` features of least use to the camera where it is: with the largest sum of the angle
   /// off the optical axis [rad], of the baseline from the first view over the distance (for a short

@@ -8,6 +8,7 @@
 #include "active_matching_slam/camera/camera_calibration.h"
 #include "active_matching_slam/filter/camera_state.h"
 #include "active_matching_slam/filter/feature_state.h"
+#include "active_matching_slam/information/mutual_information_graph.h"
 #include "active_matching_slam/map/feature_map.h"
 
 namespace active_matching_slam {
@@ -19,6 +20,7 @@ struct MapFileContent {
   std::vector<FeatureState> features;  ///< ascending id
   Eigen::MatrixXd covariance;          ///< camera, then features in their order
   std::vector<MapFeature> map;         ///< the same ids in the same order
+  MutualInformationGraph graph;        ///< of the map and of what has left it; may be empty
   FeatureId next_id = 0;
   int scale_source = 0;                                ///< the tracker's ScaleSource
   int template_size_px = 0, source_patch_size_px = 0;  ///< of ImageOptions

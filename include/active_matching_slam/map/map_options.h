@@ -8,6 +8,10 @@ namespace active_matching_slam {
 struct MapOptions {
   int features_per_frame = 60;  ///< wanted measured features in a frame
   int maximum_features = 150;   ///< the map never holds more
+  /// Features are measured by what they tell; else spread over the image.
+  bool choose_by_information = false;
+  /// Those leave a full map that tell least of the camera; else by a rule of thumb.
+  bool retire_by_information = true;
   /// A new feature keeps from every predicted one [px of an image of 640 x 480].
   double minimum_distance_px = 20;
   double maximum_view_angle_deg = 60.0;
@@ -25,6 +29,15 @@ void MapOptions::visitFields(Self& o, Visitor&& visit) {
         o.features_per_frame, 4, 1000);
   visit(basicOption("map/maximum_features", "", "the map never holds more"), o.maximum_features, 4,
         5000);
+  visit(advancedOption("map/choose_by_information", "",
+                       "measure the features that tell most for their time; false: those "
+                       "spread over the image"),
+        o.choose_by_information);
+  visit(
+      advancedOption("map/retire_by_information", "",
+                     "the features that told least of the camera of late leave a full map; false: "
+                     "those far off the axis, seen from elsewhere, or failing"),
+      o.retire_by_information);
   visit(basicOption("map/minimum_distance_px", "px",
                     "between a new feature and every other in an image of 640 x 480; in others by "
                     "the root of the number of pixels"),

@@ -11,17 +11,18 @@
 
 namespace active_matching_slam {
 
-/// constant + sum of amplitude * sin(rate * s + phase).
+/// constant + rate s + sum of amplitude * sin(rate * s + phase).
 class HarmonicSum {
  public:
   void add(double amplitude, double rate_rad_s, double phase_rad);
   void addConstant(double value) { constant_ += value; }
+  void addRate(double rate) { rate_ += rate; }
   /// Shifts the sum so that it starts at `value` for s = 0.
   void startAt(double value);
   void scale(double factor);
   double value(double s) const;
   double derivative(double s) const;
-  /// Bounds that no value exceeds.
+  /// Bounds that no value exceeds, of a sum without a rate.
   double lowest() const { return constant_ - totalAmplitude(); }
   double highest() const { return constant_ + totalAmplitude(); }
 
@@ -31,7 +32,7 @@ class HarmonicSum {
   };
   double totalAmplitude() const;
   std::vector<Term> terms_;
-  double constant_ = 0.0;
+  double constant_ = 0.0, rate_ = 0.0;
 };
 
 /// Truth of a moving camera at one time.

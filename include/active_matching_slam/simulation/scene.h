@@ -39,7 +39,8 @@ struct Stage {
   Eigen::Isometry3d T_world_start = Eigen::Isometry3d::Identity();
   Eigen::Vector3d reach_min_m = Eigen::Vector3d::Zero();  ///< components <= 0
   Eigen::Vector3d reach_max_m = Eigen::Vector3d::Zero();  ///< components >= 0
-  double size_m = 1.0;  ///< scale of hand motions: 1 for a room, less for a desk
+  double size_m = 1.0;         ///< scale of hand motions: 1 for a room, less for a desk
+  double loop_radius_m = 0.0;  ///< of the way round for a loop to the right; 0: there is none
 };
 
 /// A world of rectangles. z points up.

@@ -21,13 +21,17 @@ struct FrameState {
   explicit FrameState(const ImageOptions& options) : search(options) {}
 
   // From the prediction.
-  cv::Mat image;                        ///< with what is not used in plain grey
-  ImageMask mask;                       ///< which part of it is used
-  double interval_s = 0.0;              ///< since the filter's state before
-  double predicted_interval_s = 0.0;    ///< of that, what the motion was predicted over
-  int poor_frames = 0;                  ///< frames just before this one with too few matches
-  bool depths_vague = false;            ///< all features were seen from about one place so far
-  std::vector<VisibleFeature> visible;  ///< all that should be seen, ascending id
+  cv::Mat image;                           ///< with what is not used in plain grey
+  ImageMask mask;                          ///< which part of it is used
+  double interval_s = 0.0;                 ///< since the filter's state before
+  double predicted_interval_s = 0.0;       ///< of that, what the motion was predicted over
+  int poor_frames = 0;                     ///< frames just before this one with too few matches
+  bool depths_vague = false;               ///< all features were seen from about one place so far
+  std::vector<VisibleFeature> visible;     ///< all that should be seen, ascending id
+  std::vector<FeatureId> behind_mask;      ///< that should be seen in what is not used, ascending
+  std::vector<double> visible_bits;        ///< of each, what a search should tell of the camera
+  std::vector<double> visible_state_bits;  ///< ... and of the whole state
+  double bits_left = 0.0;  ///< what the next best one would have told that was not chosen
 
   // Of each feature chosen to be measured, in the order of `prior`.
   std::vector<VisibleFeature> candidates;

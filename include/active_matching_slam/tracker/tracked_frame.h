@@ -64,9 +64,14 @@ struct TrackedFeature {
   Eigen::Matrix2d innovation_covariance_px2;  ///< prior S_ii; valid unless kNotVisible
   Eigen::Vector2d matched_px;                 ///< kMatched (and kRejected: the best match met)
   double score = 0.0;                         ///< ZNCC of the match
-  int attempts = 0;                           ///< frames searched since it was started
-  int successes = 0;                          ///< frames matched
-  cv::Mat template_image;                     ///< 8-bit source patch at first sight
+  FeatureRates rates;                         ///< Ptp and Pfp, as learnt so far
+  double gate_sigma_px = 0.0;                 ///< noise per axis that its match is allowed
+  /// Expected of its search, by itself; 0 for kNotVisible: what it tells of the camera, and of the
+  /// whole state (Chli 2009, eq. 4.28) [bit].
+  double camera_bits = 0.0, state_bits = 0.0;
+  int attempts = 0;        ///< frames searched since it was started
+  int successes = 0;       ///< frames matched
+  cv::Mat template_image;  ///< 8-bit source patch at first sight
 };
 
 /// Time spent in each stage of a frame [ms].
@@ -99,6 +104,12 @@ struct TrackedFrame {
   Accelerations accelerations;  ///< expected of the camera, as learnt so far
   double nis = 0.0;
   int nis_degrees = 0;
+  /// What the image told of the camera (position, rotation, both velocities), 1/2 log2 |P| before
+  /// over after [bit].
+  double camera_bits = 0.0;
+  /// What the best of the visible features would have told of the state that was not chosen; 0:
+  /// none was left [bit].
+  double state_bits_left = 0.0;
 
   std::vector<TrackedFeature> features;
   std::vector<std::vector<SearchMatch>> matches;  ///< all matches met, per entry of `prior`
@@ -130,6 +141,13 @@ struct TrackedFrame {
   cv::Mat mask;  ///< 0 where the image was not used; empty: all of it was
   FrameTimings timings_ms;
 };
+
+/// KL divergence of the tree that chow_liu matched by from the joint prediction [bit]; 0 for
+/// another matcher. O(F^3), and so no part of the frame.
+double treeDivergenceBits(const TrackedFrame& frame);
+
+/// `camera_bits` for each millisecond that measuring, matching and the update took; 0 when unknown.
+double cameraBitsPerMillisecond(const TrackedFrame& frame);
 
 /// I(z_i; all others) in the prediction (Chli 2009, eq. 4.31), by feature [bit]. Costs O(F^3) and
 /// is rarely needed: so it is no part of the frame.

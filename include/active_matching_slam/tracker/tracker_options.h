@@ -8,6 +8,7 @@
 #include "active_matching_slam/filter/filter_options.h"
 #include "active_matching_slam/image/image_options.h"
 #include "active_matching_slam/image/target_detector.h"
+#include "active_matching_slam/information/requested_submaps.h"
 #include "active_matching_slam/initialisation/initialiser_options.h"
 #include "active_matching_slam/map/map_options.h"
 #include "active_matching_slam/map/relocaliser_options.h"
@@ -48,6 +49,7 @@ struct TrackerOptions {
   MapOptions map;
   MatchOptions matching = liveMatchOptions();
   MatchCascadeOptions cascade;
+  SubmapOptions submaps;
   InitialiserOptions initialisation;
   RelocaliserOptions relocaliser;
   MotionOptions motion;
@@ -127,6 +129,7 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
   visitOptions(o.map, visit);
   visitOptions(o.matching, visit);
   visitOptions(o.cascade, visit);
+  visitOptions(o.submaps, visit);
   visitOptions(o.initialisation, visit);
   visitOptions(o.relocaliser, visit);
 }
