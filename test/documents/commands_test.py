@@ -166,6 +166,7 @@ class CommandsTest(unittest.TestCase):
             folder = re.search(r'--output (\S+)', command).group(1)
             for name in ('trajectory.txt', 'statistics.csv', 'summary.json'):
                 self.assertTrue((Path(self.folder) / folder / name).is_file(), output)
+        self.run_documented(SIMULATE_BAG, self.shell.run)  # what some of them track
         self.run_documented(TRACK_BAG, track)
 
     def test_images_and_a_video_become_a_bag(self):
@@ -286,12 +287,13 @@ class CommandsTest(unittest.TestCase):
 
 TRACK_BAG = r'(rosrun %s )?track_bag .*' % PACKAGE
 IMAGES_TO_BAG = r'scripts/images_to_bag --images .+'
+SIMULATE_BAG = r'rosrun %s simulate_bag .*' % PACKAGE
 TOOL_HELP = r'rosrun %s TOOL --help' % PACKAGE
 DEMO = r'scripts/demo( BAG| desk\.bag| --headless)'
 LAUNCH = r'roslaunch .*'
 PLOT_BENCHMARK = r'scripts/plot_benchmark .*'
 RECIPES = [
-    TRACK_BAG, IMAGES_TO_BAG, TOOL_HELP, DEMO, LAUNCH, PLOT_BENCHMARK, r'rostopic hz .*',
+    TRACK_BAG, SIMULATE_BAG, IMAGES_TO_BAG, TOOL_HELP, DEMO, LAUNCH, PLOT_BENCHMARK, r'rostopic hz .*',
     r'rostopic echo -n 1 .*', r'rosservice call .*', r'rosnode ping .*',
     r'rosrun dynamic_reconfigure .*', r'rosbag record .*',
     # Run by whoever runs this test, or part of what runs above.
