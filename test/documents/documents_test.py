@@ -171,7 +171,8 @@ class Theory(unittest.TestCase):
             if not value:
                 group = name + "/"
             full = (group if indent else "") + name
-            values[full] = {cls.number(value)} & values.get(name, {cls.number(value)})
+            literals = values.get(name, set()) - {None}
+            values[full] = {cls.number(value)} & (literals or {cls.number(value)})
         return values
 
     def test_pages_are_short(self):

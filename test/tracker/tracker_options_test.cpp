@@ -54,6 +54,8 @@ Table otherValues() {
   Table table;
   TrackerOptions options;
   visitOptions(options, OtherValue{&table});
+  for (const char* other : {"submaps/preserve", "submaps/max_features"})
+    table[other] = "0";  // of the three requests one at most may be made
   return table;
 }
 
