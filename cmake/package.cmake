@@ -23,6 +23,7 @@ else()
     python3-dynamic-reconfigure python3-rosbag python3-rosmsg python3-rosnode python3-rosparam
     python3-rosservice python3-rostopic python3-diagnostic-msgs python3-geometry-msgs
     python3-nav-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-visualization-msgs
+    tf2-tools
     # Their package.xml, by which ROS finds plugins.
     libimage-transport-dev libnodelet-dev)
   set(viewer rviz)

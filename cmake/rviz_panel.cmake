@@ -30,6 +30,7 @@ if(CATKIN_ENABLE_TESTING)
     gtest)
   set_target_properties(panel_clicks PROPERTIES
     RUNTIME_OUTPUT_DIRECTORY ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_BIN_DESTINATION})
+  add_dependencies(tests panel_clicks)
   configure_file(test/rviz_panel/rviz_panel.test.in ${CMAKE_CURRENT_BINARY_DIR}/rviz_panel.test @ONLY)
   add_rostest(${CMAKE_CURRENT_BINARY_DIR}/rviz_panel.test
     DEPENDENCIES ros_test_bag panel_clicks ${PROJECT_NAME}_rviz ${PROJECT_NAME}_node)

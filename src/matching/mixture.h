@@ -198,9 +198,7 @@ class Mixture {
   /// Whether other hypotheses found matches in its ellipses that it has not searched for.
   bool hasUnclaimedMatches(const Hypothesis& h) const;
   bool awaitsConfirmation(const Hypothesis& h) const {
-    // A Gaussian of the prior claims no match that a search could confirm or refute.
-    const bool claims = h.parent >= 0;
-    return options_.deferred_pruning_weight > 0.0 && claims && !h.was_searched &&
+    return options_.deferred_pruning_weight > 0.0 && !h.was_searched &&
            h.most_weight >= options_.deferred_pruning_weight && h.hasOpenCandidate();
   }
   /// Evidence for a hypothesis from one feature's matches, given where it predicts the feature;

@@ -260,7 +260,8 @@ class CommandsTest(unittest.TestCase):
         def launch(command):
             self.shell.new_master()
             port = self.shell.environment['ROS_MASTER_URI'].rsplit(':', 1)[1]
-            if 'rviz:=' in command or 'play_bag' in command or 'demo.launch' in command:  # a window: see test_demo
+            # Those that would open a window: see test_demo.
+            if 'rviz:=' in command or 'play_bag' in command or 'demo.launch' in command:
                 command = re.sub(r' rviz:=\w+', '', command) + ' rviz:=false'
             self.shell.start(command.replace('roslaunch', 'roslaunch -p ' + port))
             self.shell.wait_for('rosparam get /run_id')
@@ -270,7 +271,7 @@ class CommandsTest(unittest.TestCase):
                 self.shell.run('python3 -c "import harness; harness.compress_bag(\'desk.bag\', '
                                '\'compressed.bag\', 60)"')
                 self.shell.start('rosbag play --quiet --loop --rate 0.5 compressed.bag </dev/null')
-            elif 'tracker.launch' in command:
+            elif re.search(r'tracker\.launch|wheeled_base\.launch|drone\.launch', command):
                 self.shell.start_camera()
             self.shell.wait_until_tracking()
             for process in reversed(list(self.shell.started)):
@@ -302,6 +303,7 @@ RECIPES = [
     # Hours of work; tried in small in test/tools/reproduce_test.cpp.
     r'rosrun %s reproduce .*' % PACKAGE, r'rosrun %s reliability' % PACKAGE,
     r'rosrun %s consistency' % PACKAGE, r'scripts/update_.*',
+    r'scripts/odometry_from_truth',  # needs a recording's truth
     r'scripts/compare_runs .*',  # in small in test/tools/compare_runs_test.py
     # Run in machines_test.py.
     r'export ROS_.*', r'ping .*',
