@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "active_matching_slam/ros/frame_name.h"
 #include "active_matching_slam/ros/motion_conversions.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 
@@ -12,10 +13,6 @@ namespace {
 
 /// Of a second of a fast IMU. Cost: memory.
 constexpr int kMotionQueueSize = 1000;
-
-std::string nameWithoutSlash(const std::string& frame) {
-  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-}
 
 }  // namespace
 
@@ -72,7 +69,7 @@ void MotionSubscription::takeIn() {
     imu.swap(imu_);
   }
   const auto add = [&](const std_msgs::Header& header, const std::string& frame, auto&& sampleOf) {
-    base_frame_ = nameWithoutSlash(frame);
+    base_frame_ = withoutLeadingSlash(frame);
     std::string wrong;
     try {
       if (header.stamp.isZero()) throw std::invalid_argument("without a stamp: left out");

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "active_matching_slam/ros/frame_name.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 
 namespace active_matching_slam {
@@ -10,10 +11,6 @@ namespace {
 
 /// As many as a busy /tf has in a second. Cost: memory for so many messages.
 constexpr int kTransformQueueSize = 1000;
-
-std::string withoutSlash(const std::string& frame) {
-  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-}
 
 }  // namespace
 
@@ -83,8 +80,8 @@ void PoseBroadcaster::send(const TrackedFrame& frame, const std::string& camera_
 void PoseBroadcaster::onTransforms(const tf2_msgs::TFMessage& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const geometry_msgs::TransformStamped& transform : message.transforms) {
-    const std::string parent = withoutSlash(transform.header.frame_id);
-    if (child_frame_.empty() || withoutSlash(transform.child_frame_id) != child_frame_ ||
+    const std::string parent = withoutLeadingSlash(transform.header.frame_id);
+    if (child_frame_.empty() || withoutLeadingSlash(transform.child_frame_id) != child_frame_ ||
         parent == options_.world_frame)
       continue;
     parents_warning_.say("Frame '" + child_frame_ + "' has two parents on tf, '" +
@@ -96,7 +93,7 @@ void PoseBroadcaster::onTransforms(const tf2_msgs::TFMessage& message) {
 
 UncertainPose PoseBroadcaster::cameraOf(const UncertainPose& given, const std::string& frame_id,
                                         const std::string& camera_frame) {
-  const std::string frame = withoutSlash(frame_id);
+  const std::string frame = withoutLeadingSlash(frame_id);
   const bool in_map = frame == options_.map_frame && T_map_world_;
   if (frame != options_.world_frame && !in_map)
     throw std::invalid_argument("its frame_id is '" + frame_id + "', must be " +

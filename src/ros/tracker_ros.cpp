@@ -7,6 +7,7 @@
 
 #include "active_matching_slam/image/image_mask.h"
 #include "active_matching_slam/ros/bound_options.h"
+#include "active_matching_slam/ros/frame_name.h"
 #include "active_matching_slam/ros/image_conversions.h"
 
 namespace active_matching_slam {
@@ -206,8 +207,7 @@ void TrackerRos::forgetPast(bool time_jumped) {
 
 std::string TrackerRos::cameraFrame(const std_msgs::Header& header) const {
   if (!options_.camera_frame.empty()) return options_.camera_frame;
-  std::string frame = header.frame_id;
-  if (!frame.empty() && frame.front() == '/') frame.erase(0, 1);
+  const std::string frame = withoutLeadingSlash(header.frame_id);
   if (!frame.empty() && frame != options_.world_frame) return frame;
   ROS_WARN_STREAM_ONCE("The images' frame_id '" << header.frame_id
                                                 << "' can't name the camera: using 'camera' (set "

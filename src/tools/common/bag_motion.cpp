@@ -10,15 +10,12 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "active_matching_slam/ros/frame_name.h"
 #include "active_matching_slam/ros/motion_conversions.h"
 #include "active_matching_slam/ros/pose_conversions.h"
 
 namespace active_matching_slam {
 namespace {
-
-std::string withoutLeadingSlash(const std::string& frame) {
-  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-}
 
 template <class Use>
 void forEachMessage(const Bags& bags, const std::string& topic, Use use) {
