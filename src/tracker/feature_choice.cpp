@@ -1,10 +1,6 @@
 #include "feature_choice.h"
 
-#include <algorithm>
 #include <cstddef>
-#include <numeric>
-#include <optional>
-#include <utility>
 
 #include "active_matching_slam/filter/camera_information.h"
 #include "active_matching_slam/information/greedy_information.h"

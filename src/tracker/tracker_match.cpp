@@ -1,10 +1,11 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "active_matching_slam/filter/measurement_model.h"
 #include "active_matching_slam/image/warp.h"
+#include "active_matching_slam/information/gaussian_information.h"
 #include "feature_choice.h"
 #include "tracker_implementation.h"
 
@@ -17,13 +18,8 @@ constexpr double kVelocityDecay = 0.7;
 
 /// 1/2 log2 |before| / |after| [bit]; 0 where one of them is singular.
 double informationGained(const MotionCovariance& before, const MotionCovariance& after) {
-  const Eigen::LLT<MotionCovariance> a(before), b(after);
-  if (a.info() != Eigen::Success || b.info() != Eigen::Success) return 0.0;
-  const auto log2Root = [](const Eigen::LLT<MotionCovariance>& factor) {
-    return MotionCovariance(factor.matrixL()).diagonal().array().log2().sum();
-  };
-  const double bits = log2Root(a) - log2Root(b);
-  return std::isfinite(bits) ? std::max(bits, 0.0) : 0.0;
+  const std::optional<double> prior = entropyBits(before), posterior = entropyBits(after);
+  return prior && posterior ? std::max(*prior - *posterior, 0.0) : 0.0;
 }
 
 }  // namespace
