@@ -43,22 +43,34 @@ struct Separator {
 Separator chooseSeparator(const Eigen::Ref<const Eigen::MatrixXd>& P,
                           const SeparatorCandidates& candidates, const SeparatorLimits& limits);
 
+/// Two sides of a cut, given the separator.
+struct GivenSeparator {
+  Eigen::MatrixXd inside;   ///< cov(J | C)
+  Eigen::MatrixXd outside;  ///< cov(R | C)
+  Eigen::MatrixXd across;   ///< cov(J, R | C)
+};
+GivenSeparator givenSeparator(const Eigen::Ref<const Eigen::MatrixXd>& P, const std::vector<int>& J,
+                              const std::vector<int>& R, const std::vector<int>& C);
+
 /// What is to be added to both sides when the link between them is dropped.
 struct ConservativeCut {
-  Eigen::MatrixXd inside;   ///< to cov(J | C), positive semi-definite
-  Eigen::MatrixXd outside;  ///< to cov(R | C), likewise
-  Eigen::VectorXd correlations;  ///< canonical, 0 to 1
-  double bits = 0.0;             ///< I(J; R | C) = -1/2 sum log2(1 - rho^2)
+  Eigen::MatrixXd inside;     ///< to cov(J | C), positive semi-definite
+  Eigen::MatrixXd outside;    ///< to cov(R | C), likewise
+  Eigen::MatrixXd explained;  ///< of cov(J | C), what R knows: X D^-1 X^T
 };
 
 /// Cuts J from R, given the covariances under condition of the separator: A = cov(J | C),
 /// D = cov(R | C), X = cov(J, R | C). With A = L_A L_A^T, D = L_D L_D^T and the canonical
 /// correlations L_A^-1 X L_D^-T = U diag(rho) V^T it adds L_A U diag(rho) U^T L_A^T and
 /// L_D V diag(rho) V^T L_D^T: as [rho -rho; -rho rho] >= 0, the covariance of both without the link
-/// is then not less than with it, in any direction, and no measurement counts twice (as in the
-/// bound of Uhlmann 1996, by direction).
+/// is then not less than with it, in any direction, and no measurement counts twice.
 ConservativeCut conservativeCut(const Eigen::Ref<const Eigen::MatrixXd>& A,
                                 const Eigen::Ref<const Eigen::MatrixXd>& D,
                                 const Eigen::Ref<const Eigen::MatrixXd>& X);
+
+/// Of a variable with covariance A, what is told by something that explains so much of it,
+/// 1/2 log2(|A| / |A - explained|) [bit]; for several that are independent, the sum of `explained`.
+double explainedInformation(const Eigen::Ref<const Eigen::MatrixXd>& A,
+                            const Eigen::Ref<const Eigen::MatrixXd>& explained);
 
 }  // namespace active_matching_slam

@@ -33,6 +33,11 @@ struct Conditional {
   /// Appends J to `joint`, which holds all of C: P_J. = K P_C., P_JJ = K P_CC K^T + Q.
   void apply(PointGaussian& joint) const;
 
+  /// K P_CC K^T + Q of any joint in which C has these rows, by the covariances K P_C. with all of
+  /// it.
+  Eigen::MatrixXd ownCovariance(const Eigen::Ref<const Eigen::MatrixXd>& cross,
+                                const std::vector<int>& given_rows) const;
+
   /// All lengths times `factor` > 0.
   void rescale(double factor);
 };

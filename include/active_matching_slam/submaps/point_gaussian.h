@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "active_matching_slam/math/feature_id.h"
+#include "active_matching_slam/math/row_selection.h"
 
 namespace active_matching_slam {
 
@@ -27,8 +28,10 @@ std::unordered_map<FeatureId, int> indicesOf(const std::vector<FeatureId>& ids);
 /// not there or is asked for twice.
 std::vector<int> indicesOf(const std::vector<FeatureId>& ids, const std::vector<FeatureId>& all);
 
-/// `first`, ... rows of the calibration and then of these points (indices).
-std::vector<int> rowsOf(int calibration_size, const std::vector<int>& points,
-                        bool with_calibration);
+/// Rows of these points (indices) behind a calibration of so many rows.
+std::vector<int> rowsOf(int calibration_size, const std::vector<int>& points);
+
+/// Those of 0 ... count - 1 that are not among `indices`, ascending.
+std::vector<int> othersOf(const std::vector<int>& indices, int count);
 
 }  // namespace active_matching_slam

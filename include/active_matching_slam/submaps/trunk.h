@@ -51,7 +51,7 @@ class Trunk {
   void inflate(const Eigen::MatrixXd& added);
 
   /// All lengths times `factor` > 0, as the filter has.
-  void rescale(double factor);
+  void rescale(double factor) { conditional_.rescale(factor); }
 
  private:
   Conditional conditional_;
