@@ -14,7 +14,7 @@ FLOORS = [
     {"math"},
     {"camera", "information"},
     {"matching", "filter", "simulation"},
-    {"image", "initialisation"},
+    {"image", "initialisation", "submaps"},
     {"map"},
     {"tracker"},
     {"visualisation"},
