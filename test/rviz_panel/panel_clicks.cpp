@@ -1,4 +1,4 @@
-// What a user does with the panel, beside a tracker at /tracker that a bag is played to.
+// What a user does with the panel, beside a tracker at /tracker that is fed a film without end.
 //
 //   panel_clicks [--picture FILE]    --picture: waits until the tracker tracks, and saves a picture
 #include <gtest/gtest.h>
