@@ -14,6 +14,9 @@ namespace {
 /// Every how many frames submaps that should be in view are made active. Cost: it takes as long as
 /// a frame or two, and what is asked of each as long as a tenth of one.
 constexpr int kReactivationPeriodFrames = 4;
+/// With room left for fewer features, some are laid aside. Cost: with less room, features are begun
+/// later in a view that changes fast; with more, some leave that are soon to be seen again.
+constexpr int kRoomLeft = 15;
 /// Submaps in which the camera is looked for in an image. Cost: each takes as long as a frame.
 constexpr int kSubmapsPerLook = 3;
 /// Features matched in so many images before a loop are carried along with the camera to where its
@@ -36,7 +39,7 @@ void Tracker::Implementation::keepSubmaps(const TrackedFrame& frame) {
   submaps_.observe(visible, behind_mask, map_, last_stamp_s_);
   // Until the first images have been adjusted together, what they made of the map may be replaced.
   if (!initialiser_.isDone() || poor_frames_ > 0 || state_ != TrackingState::kTracking) return;
-  if (map_.size() + options_.map.features_per_frame / 4 > options_.map.maximum_features)
+  if (map_.size() + kRoomLeft > options_.map.maximum_features)
     submaps_.layAside(last_stamp_s_, &filter_, &map_);
   submaps_.restSeparators(last_stamp_s_, &filter_, &map_);
   if (frame.index % kReactivationPeriodFrames != 0 || submaps_.tree().empty()) return;

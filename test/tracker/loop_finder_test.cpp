@@ -68,7 +68,7 @@ TEST(LoopFinder, ADriftThatTheFilterKnowsOfIsExpectedAndALargerOneIsNot) {
 TEST(LoopFinder, ASubmapThatMovesWithTheCameraSaysNothingOfADrift) {
   DriftedCamera drifted(3.0);
   // All that is uncertain is where both are: then they can't be apart.
-  Ekf filter(FilterOptions());
+  Ekf filter{FilterOptions()};
   filter.reset(CameraState(), 1e-8 * MotionCovariance::Identity());
   for (const FeatureState& feature : drifted.filter.features())
     filter.addPointFeature(feature.point_world, 1e-8 * Eigen::Matrix3d::Identity());
@@ -124,8 +124,8 @@ TEST(LoopFinder, WhatIsLoosenedMovesWithTheCameraAsABody) {
       Eigen::Vector3d::UnitY().cross(feature.point_world - filter.camera().position_world);
   EXPECT_TRUE((more.block<3, 3>(feature.offset, feature.offset))
                   .isApprox(0.01 * way * way.transpose(), 1e-9));
-  EXPECT_TRUE((more.block<3, 1>(feature.offset, CameraError::kRotation + 1))
-                  .isApprox(0.01 * way, 1e-9));
+  EXPECT_TRUE(
+      (more.block<3, 1>(feature.offset, CameraError::kRotation + 1)).isApprox(0.01 * way, 1e-9));
   EXPECT_EQ(more(CameraError::kPosition, CameraError::kPosition), 0.0);
   const FeatureState& other = filter.features()[2];
   EXPECT_TRUE(more.middleRows<3>(other.offset).isZero(0.0));

@@ -35,7 +35,8 @@ const Film& sweepFilm() {
 /// A tracker that has seen the whole film, and what it said.
 struct Sweep {
   Tracker tracker{sweepFilm().camera, submapOptions()};
-  Frames frames = trackFrames(sweepFilm(), &tracker, 0, static_cast<int>(sweepFilm().frames.size()));
+  Frames frames =
+      trackFrames(sweepFilm(), &tracker, 0, static_cast<int>(sweepFilm().frames.size()));
 };
 
 const Sweep& sweep() {
