@@ -101,7 +101,7 @@ ExperimentResult runMixtureSteps(Workbench& bench) {
   ExperimentResult result;
   Tally all;
   const int features = bench.featureCounts()[1];
-  std::size_t most_steps = 0;
+  std::size_t most_live = 0;
   for (const std::string& name : bench.testBedSequences()) {
     RecordingOptions options;
     options.every = 4;
@@ -141,12 +141,17 @@ ExperimentResult runMixtureSteps(Workbench& bench) {
                    has_free ? Cell(static_cast<int>(free_trace[k].weights.size())) : Cell(""),
                    has_free ? Cell(insignificantIn(free_trace[k])) : Cell(""), heaviest});
       }
-      if (name != bench.mainSequence() || trace.size() <= most_steps) continue;
-      most_steps = trace.size();
+      const auto peak = std::max_element(
+          trace.begin(), trace.end(),
+          [](const MatchStep& a, const MatchStep& b) { return a.pruned.size() < b.pruned.size(); });
+      if (name != bench.mainSequence() || peak->pruned.size() <= most_live) continue;
+      most_live = peak->pruned.size();
+      const auto peak_step = static_cast<std::size_t>(peak - trace.begin()) + 1;
       const cv::Mat& image = sequence.images[static_cast<std::size_t>(problem.image)];
       const MatchReplay replay(trial);
       std::vector<cv::Mat> panels;
-      for (const std::size_t k : std::set<std::size_t>{0, 1, 2, 3, trace.size()})
+      for (const std::size_t k : std::set<std::size_t>{0, 1, peak_step, std::min(peak_step + 1, trace.size()),
+                                                         trace.size()})
         panels.push_back(drawStep(image, problem.prior, replay, trace, k));
       panels.push_back(drawSearched(image, problem.prior, trace,
                                     static_cast<double>(s.pixels_searched),
