@@ -48,7 +48,8 @@ double agreementWithPlace(const Clusters& clusters) {
     }
     same += clusters.labels[neighbour] == clusters.labels[i];
   }
-  return static_cast<double>(same) / static_cast<double>(std::max<std::size_t>(1, clusters.pixels.size()));
+  return static_cast<double>(same) /
+         static_cast<double>(std::max<std::size_t>(1, clusters.pixels.size()));
 }
 
 /// Fraction of the features that two clusters put on the right side of the largest gap between
@@ -97,7 +98,7 @@ ExperimentResult runFrameClusters(Workbench& bench) {
     const int last = static_cast<int>(sequence.images.size()) - 1;
     trackSequence(sequence, referenceOptions(sequence, bench.quick() ? 20 : 30), 1,
                   [&](const TrackedFrame& frame, int image) {
-                    // Correlations have settled in the second half.
+                    // In the second half depths are known.
                     if (2 * image < last || image % 10 != 0 || frame.prior.size() < 10) return;
                     const Clusters clusters = clustersOf(frame, 2);
                     const double place = agreementWithPlace(clusters),
@@ -118,13 +119,12 @@ ExperimentResult runFrameClusters(Workbench& bench) {
        "clusters mostly by proximity in the image",
        text("%.0f %% (%d frames)", 100.0 * place_of_plane / frames_of_plane, frames_of_plane),
        verdict(place_of_plane >= 0.8 * frames_of_plane)});
-  result.findings.push_back(
-      {"two depths: features that two clusters put with those of their depth",
-       "foreground and background are told apart",
-       text("%.0f %% (%d frames); nearest in the image in the same: %.0f %%",
-            100.0 * depth_of_depths / frames_of_depths, frames_of_depths,
-            100.0 * place_of_depths / frames_of_depths),
-       verdict(depth_of_depths >= 0.8 * frames_of_depths)});
+  result.findings.push_back({"two depths: features that two clusters put with those of their depth",
+                             "foreground and background are told apart",
+                             text("%.0f %% (%d frames); nearest in the image in the same: %.0f %%",
+                                  100.0 * depth_of_depths / frames_of_depths, frames_of_depths,
+                                  100.0 * place_of_depths / frames_of_depths),
+                             verdict(depth_of_depths >= 0.8 * frames_of_depths)});
   return result;
 }
 

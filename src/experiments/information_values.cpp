@@ -120,8 +120,8 @@ ExperimentResult runInformationValues(Workbench& bench) {
       most_wins += v.shrink_bits[most] > v.shrink_bits[least];
       after_most.push_back(v.shrink_bits[most]);
       after_least.push_back(v.shrink_bits[least]);
-      const double scale = std::sqrt(covarianceOf(v.bits, v.bits) *
-                                     covarianceOf(v.shrink_bits, v.shrink_bits));
+      const double scale =
+          std::sqrt(covarianceOf(v.bits, v.bits) * covarianceOf(v.shrink_bits, v.shrink_bits));
       if (scale > 0.0) correlations.push_back(covarianceOf(v.bits, v.shrink_bits) / scale);
       const std::vector<double> of_most = v.pairsOf(v.most);
       spread_features.push_back(spreadOf(v.bits));
@@ -153,8 +153,8 @@ ExperimentResult runInformationValues(Workbench& bench) {
   result.findings.push_back(
       {"area of the other ellipses, once the feature with most, with least MI is measured",
        "reduced much more by the one with most (of 14; 7 against 1.9 bits)",
-       text("%.1f %%, %.1f %%; less in %d of %d frames", areaLeft(after_most), areaLeft(after_least),
-            most_wins, frames),
+       text("%.1f %%, %.1f %%; less in %d of %d frames", areaLeft(after_most),
+            areaLeft(after_least), most_wins, frames),
        verdict(most_wins == frames)});
   result.findings.push_back(
       {"correlation of a feature's MI with the bits by which the other ellipses shrink",

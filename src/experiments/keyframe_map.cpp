@@ -59,9 +59,8 @@ RecordedProblem problemOf(const Sequence& sequence, const Moment& moment,
     feature.kind = FeatureKind::kPoint;
     feature.point_world = at->second;
     Eigen::Matrix<double, 2, 6> J;
-    const auto projection =
-        projectFromPose(sequence.camera, moment.T_world_camera.translation(),
-                        moment.T_world_camera.linear(), feature, &J);
+    const auto projection = projectFromPose(sequence.camera, moment.T_world_camera.translation(),
+                                            moment.T_world_camera.linear(), feature, &J);
     if (!projection || !sequence.camera.isInImage(projection->pixel, border_px)) continue;
     places.push_back(projection->pixel);
     jacobians.push_back(J);

@@ -37,8 +37,8 @@ double rankCorrelation(const std::vector<double>& x, const std::vector<double>& 
   const auto ranksOf = [](const std::vector<double>& values) {
     std::vector<double> ranks;
     for (const double value : values) {
-      const auto below = std::count_if(values.begin(), values.end(),
-                                       [&](double other) { return other < value; });
+      const auto below =
+          std::count_if(values.begin(), values.end(), [&](double other) { return other < value; });
       const auto equal = std::count(values.begin(), values.end(), value);
       ranks.push_back(static_cast<double>(below) + 0.5 * static_cast<double>(equal - 1));
     }
@@ -76,9 +76,9 @@ Eigen::Vector2d trueMove(const Sequence& sequence, const Eigen::Vector2d& pixel,
   const Eigen::Isometry3d &T_from = sequence.truth[static_cast<std::size_t>(from)].T_world_camera,
                           &T_to = sequence.truth[static_cast<std::size_t>(to)].T_world_camera;
   const auto bearing = sequence.camera.unproject(pixel);
-  const auto point = bearing ? firstHit(sequence.surfaces, T_from.translation(),
-                                        T_from.linear() * *bearing)
-                             : std::nullopt;
+  const auto point =
+      bearing ? firstHit(sequence.surfaces, T_from.translation(), T_from.linear() * *bearing)
+              : std::nullopt;
   const auto moved = point ? sequence.camera.project(T_to.inverse() * *point) : std::nullopt;
   return moved && sequence.camera.isInImage(*moved) ? *moved : unknownPixel();
 }
@@ -105,7 +105,8 @@ void addCorners(const Sequence& sequence, int from, int to, int level, Scale* sc
     templates.push_back(*patch);
     places.push_back(corner.pixel);
   }
-  const auto alike = searchWholeImage(first, templates), again = searchWholeImage(second, templates);
+  const auto alike = searchWholeImage(first, templates),
+             again = searchWholeImage(second, templates);
   const double megapixels = 1e-6 * static_cast<double>(first.total());
   for (std::size_t i = 0; i < templates.size(); ++i) {
     ++scale->corners;
@@ -203,10 +204,9 @@ ExperimentResult runLookAlikes(Workbench& bench) {
   result.tables.emplace_back("scales", by_scale);
   result.findings.push_back(
       {"other places that look like a corner, by the scale of its detection", "-", places});
-  result.findings.push_back(
-      {"error of the place where it is found again [px of the image]",
-       "R no longer constant across scales", errors,
-       verdict(scales[2].rmsError() > 2.0 * scales[0].rmsError())});
+  result.findings.push_back({"error of the place where it is found again [px of the image]",
+                             "R no longer constant across scales", errors,
+                             verdict(scales[2].rmsError() > 2.0 * scales[0].rmsError())});
   return result;
 }
 

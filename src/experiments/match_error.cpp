@@ -1,6 +1,6 @@
-// Figures 7.12 and 7.13: distance of the matches of AM, CLAM and FAM from a reference, as the templates get
-// smaller and less distinct. The reference is the simulator's truth, and in a recording the
-// reference matcher (section 7.6).
+// Figures 7.12 and 7.13: distance of the matches of AM, CLAM and FAM from a reference, as the
+// templates get smaller and less distinct. The reference is the simulator's truth, and in a
+// recording the reference matcher (section 7.6).
 
 #include <algorithm>
 #include <array>

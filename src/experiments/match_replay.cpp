@@ -33,9 +33,10 @@ MatchReplay::MatchReplay(const MatchingTrial& trial) {
   for (const MatchStep& step : trial.result.trace) {
     for (const int m : step.spawned) {
       std::vector<Match> matches = matches_[step.gaussian];
-      matches.push_back({step.feature, trial.matches[static_cast<std::size_t>(step.feature)]
-                                                    [static_cast<std::size_t>(m)]
-                                                        .pixel});
+      matches.push_back(
+          {step.feature,
+           trial.matches[static_cast<std::size_t>(step.feature)][static_cast<std::size_t>(m)]
+               .pixel});
       matches_[next++] = std::move(matches);
     }
   }

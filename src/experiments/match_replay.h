@@ -17,9 +17,7 @@ struct JointPoints {
   Eigen::MatrixXd S;  ///< 2F x 2F [px^2]
 
   Eigen::Vector2d mean(int feature) const { return z.segment<2>(2 * feature); }
-  Eigen::Matrix2d covariance(int feature) const {
-    return S.block<2, 2>(2 * feature, 2 * feature);
-  }
+  Eigen::Matrix2d covariance(int feature) const { return S.block<2, 2>(2 * feature, 2 * feature); }
   /// Given that the feature is at `pixel`; its own covariance becomes 0.
   void condition(int feature, const Eigen::Vector2d& pixel);
 };

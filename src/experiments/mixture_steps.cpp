@@ -25,7 +25,7 @@ MatcherVariant unpruned() {
 }
 
 cv::Scalar colorOf(int gaussian) {
-  static const cv::Scalar colors[] = {{90, 90, 240}, {240, 170, 60}, {80, 220, 80},
+  static const cv::Scalar colors[] = {{90, 90, 240},  {240, 170, 60}, {80, 220, 80},
                                       {60, 220, 240}, {230, 90, 230}, {240, 240, 90}};
   return colors[static_cast<std::size_t>(gaussian) % (sizeof(colors) / sizeof(colors[0]))];
 }
@@ -51,7 +51,8 @@ cv::Mat drawStep(const cv::Mat& image, const MeasurementPrior& prior, const Matc
   if (step > 0) live = trace[step - 1].pruned;
   std::string caption = text("after %zu searches:", step);
   for (const MatchStep::GaussianWeight& one : live) {
-    drawJoint(stateOf(prior, replay, one.gaussian), colorOf(one.gaussian - replay.prior()), &canvas);
+    drawJoint(stateOf(prior, replay, one.gaussian), colorOf(one.gaussian - replay.prior()),
+              &canvas);
     caption += text(" G%d %.3f", one.gaussian - replay.prior(), one.weight);
   }
   if (step < trace.size()) {
@@ -81,7 +82,8 @@ cv::Mat drawWeights(const std::vector<MatchStep>& trace) {
   for (std::size_t k = 0; k < std::min<std::size_t>(24, trace.size()); ++k) {
     ChartBar bar{std::to_string(k + 1), std::vector<double>(kParts, 0.0)};
     for (const MatchStep::GaussianWeight& one : trace[k].weights)
-      bar.values[static_cast<std::size_t>(std::min(one.gaussian - first, kParts - 1))] += one.weight;
+      bar.values[static_cast<std::size_t>(std::min(one.gaussian - first, kParts - 1))] +=
+          one.weight;
     chart.bars.push_back(bar);
   }
   return drawBarChart(chart);
@@ -150,8 +152,8 @@ ExperimentResult runMixtureSteps(Workbench& bench) {
       const cv::Mat& image = sequence.images[static_cast<std::size_t>(problem.image)];
       const MatchReplay replay(trial);
       std::vector<cv::Mat> panels;
-      for (const std::size_t k : std::set<std::size_t>{0, 1, peak_step, std::min(peak_step + 1, trace.size()),
-                                                         trace.size()})
+      for (const std::size_t k : std::set<std::size_t>{
+               0, 1, peak_step, std::min(peak_step + 1, trace.size()), trace.size()})
         panels.push_back(drawStep(image, problem.prior, replay, trace, k));
       panels.push_back(drawSearched(image, problem.prior, trace,
                                     static_cast<double>(s.pixels_searched),
@@ -161,10 +163,10 @@ ExperimentResult runMixtureSteps(Workbench& bench) {
   }
   result.tables.emplace_back("", table);
   if (all.frames == 0) return result;
-  result.findings.push_back(
-      {"ambiguous frames: weight of the accepted Gaussian, mean", "the ambiguity is resolved",
-       text("%.3f (%d frames)", all.weight / all.frames, all.frames),
-       verdict(all.weight > 0.9 * all.frames)});
+  result.findings.push_back({"ambiguous frames: weight of the accepted Gaussian, mean",
+                             "the ambiguity is resolved",
+                             text("%.3f (%d frames)", all.weight / all.frames, all.frames),
+                             verdict(all.weight > 0.9 * all.frames)});
   result.findings.push_back(
       {"ambiguous frames: area searched, of that of all ellipses of the prediction",
        "less in this example; 12 to 15 % in table 5.2",

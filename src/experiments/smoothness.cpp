@@ -79,10 +79,10 @@ ExperimentResult runSmoothness(Workbench& bench) {
   chart.series.push_back(truth);
   result.tables.emplace_back("", table);
   result.pictures.emplace_back("", drawLineChart(chart, 960, 480));
-  result.findings.push_back({"distance of a pose from the middle of its neighbours, but for the "
-                             "truth's, by features [mm]",
-                             "far smoother with 40 than with 20", here,
-                             verdict(jitter[1] < jitter[0])});
+  result.findings.push_back(
+      {"distance of a pose from the middle of its neighbours, but for the "
+       "truth's, by features [mm]",
+       "far smoother with 40 than with 20", here, verdict(jitter[1] < jitter[0])});
   result.findings.push_back({"... gained by 20 more, and by 20 more again [mm]",
                              "with 60 a much smaller difference",
                              text("%.3f; %.3f", jitter[0] - jitter[1], jitter[1] - jitter[2]),

@@ -51,8 +51,7 @@ Links stateLinks(const MapFileContent& map, const std::vector<FeatureId>& ids) {
   for (const FeatureId id : ids)
     if (const FeatureState* feature = filter.find(id)) features.push_back(feature);
   const auto block = [&](const FeatureState& a, const FeatureState& b) -> Eigen::Matrix3d {
-    return pointJacobian(a) *
-           filter.covariance().block(a.offset, b.offset, a.size(), b.size()) *
+    return pointJacobian(a) * filter.covariance().block(a.offset, b.offset, a.size(), b.size()) *
            pointJacobian(b).transpose();
   };
   Links links;
@@ -154,7 +153,8 @@ ExperimentResult runStateSpace(Workbench& bench) {
   result.pictures.emplace_back("", tilePictures(panels, 2));
   if (state[0].count == 0 || state[1].count == 0) return result;
   result.findings.push_back(
-      {"mean information of a pair late in the sequence: in the space of the state, of measurements",
+      {"mean information of a pair late in the sequence: in the space of the state, of "
+       "measurements",
        "two orders of magnitude larger in that of the state",
        text("%.2f, %.2f bits", state[1].mean, measurement[1].mean),
        verdict(state[1].mean > 10.0 * measurement[1].mean)});
