@@ -107,7 +107,9 @@ void Tracker::Implementation::findScale(TrackedFrame* frame) {
   initialiser_.end();  // its adjustment would leave the unit of length free
   frame->rescaled_by = 1.0 / scale->map_units_per_m;
   rescale(frame->rescaled_by);
+  submaps_.openTrunk(&filter_);
   filter_.loosenScale(scale->relative_sigma);
+  submaps_.closeTrunk(&filter_);
   scale_source_ = ScaleSource::kOdometry;
   frame->reason = "the map is metric from here on: its scale is known by odometry";
 }

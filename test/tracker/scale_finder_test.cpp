@@ -31,7 +31,8 @@ TEST(ScaleFinder, ACameraThatGoesToAndFroIsMeasuredByItsWholeWay) {
   ScaleFinder finder;
   for (int i = 0; i < 400; ++i) {
     const double side = i / 10 % 2 == 0 ? 1.0 : -1.0;
-    finder.add(uncertain({side * 0.05, 0.0, 0.0}, 0.001), uncertain({side * 0.02, 0.0, 0.0}, 0.005));
+    finder.add(uncertain({side * 0.05, 0.0, 0.0}, 0.001),
+               uncertain({side * 0.02, 0.0, 0.0}, 0.005));
   }
   ASSERT_TRUE(finder.scale());
   EXPECT_NEAR(finder.scale()->map_units_per_m, 2.5, 0.05);

@@ -14,6 +14,7 @@
 #include "active_matching_slam/map/relocaliser_options.h"
 #include "active_matching_slam/matching/match_options.h"
 #include "active_matching_slam/math/option_field.h"
+#include "active_matching_slam/submaps/submap_filter_options.h"
 #include "active_matching_slam/tracker/match_cascade_options.h"
 #include "active_matching_slam/tracker/motion_options.h"
 
@@ -50,6 +51,7 @@ struct TrackerOptions {
   MatchOptions matching = liveMatchOptions();
   MatchCascadeOptions cascade;
   SubmapOptions submaps;
+  SubmapFilterOptions submap_filter;
   InitialiserOptions initialisation;
   RelocaliserOptions relocaliser;
   MotionOptions motion;
@@ -129,6 +131,7 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
   visitOptions(o.map, visit);
   visitOptions(o.matching, visit);
   visitOptions(o.cascade, visit);
+  visitOptions(o.submap_filter, visit);
   visitOptions(o.submaps, visit);
   visitOptions(o.initialisation, visit);
   visitOptions(o.relocaliser, visit);
