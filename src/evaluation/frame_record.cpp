@@ -40,6 +40,16 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.times_lost = frame.times_lost;
   record.map = frame.map;
   record.jumps = frame.jumps;
+  if (frame.frozen) {
+    record.submaps = frame.frozen->submaps;
+    record.frozen_features = static_cast<int>(frame.frozen->features.size());
+    record.trunk_features = frame.frozen->trunk_features;
+    record.lost_bits = frame.frozen->lost_bits;
+    record.submaps_frozen = frame.frozen->frozen;
+    record.submaps_found = frame.frozen->found;
+  }
+  record.loops = frame.loops;
+  record.map_epoch = frame.map_epoch;
   record.quality = frame.quality;
   record.quality_reason = frame.quality_reason;
   record.accelerations = frame.accelerations;

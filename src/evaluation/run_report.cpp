@@ -112,7 +112,15 @@ void addMatchingColumns(std::vector<Column>* columns) {
       column("features_started", &FrameRecord::features_started),
       column("features_retired", &FrameRecord::features_retired),
       column("features_converted", &FrameRecord::features_converted),
-      column("features_failed", &FrameRecord::features_failed)};
+      column("features_failed", &FrameRecord::features_failed),
+      column("submaps", &FrameRecord::submaps),
+      column("frozen_features", &FrameRecord::frozen_features),
+      column("trunk_features", &FrameRecord::trunk_features),
+      column("submap_lost_bits", &FrameRecord::lost_bits),
+      column("submaps_frozen", &FrameRecord::submaps_frozen),
+      column("submaps_found", &FrameRecord::submaps_found),
+      column("loops", &FrameRecord::loops),
+      column("map_epoch", &FrameRecord::map_epoch)};
   columns->insert(columns->end(), matching.begin(), matching.end());
 }
 

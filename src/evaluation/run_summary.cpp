@@ -140,6 +140,13 @@ void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summ
     summary->started += record.features_started;
     summary->retired += record.features_retired;
     summary->converted += record.features_converted;
+    summary->submaps_end = record.submaps;
+    summary->frozen_features_end = record.frozen_features;
+    summary->lost_bits_end = record.lost_bits;
+    summary->trunk_features_most = std::max(summary->trunk_features_most, record.trunk_features);
+    summary->submaps_frozen = std::max(summary->submaps_frozen, record.submaps_frozen);
+    summary->submaps_found = std::max(summary->submaps_found, record.submaps_found);
+    summary->loops = std::max(summary->loops, record.loops);
     summary->times_lost = std::max(summary->times_lost, record.times_lost);
     summary->resets = std::max(summary->resets, record.resets);
     summary->late_images = std::max(summary->late_images, record.late_images);

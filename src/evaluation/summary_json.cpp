@@ -58,6 +58,13 @@ std::string summaryJson(const RunSummary& s) {
                  {"started", s.started},
                  {"retired", s.retired},
                  {"converted", s.converted}};
+  json["submaps"] = {{"end", s.submaps_end},
+                     {"frozen_features_end", s.frozen_features_end},
+                     {"trunk_features_most", s.trunk_features_most},
+                     {"lost_bits_end", s.lost_bits_end},
+                     {"frozen", s.submaps_frozen},
+                     {"found", s.submaps_found},
+                     {"loops", s.loops}};
   json["ms"] = Json::object();
   for (const DurationSummary& duration : s.durations)
     json["ms"][duration.stage] = {{"median", duration.median_ms}, {"p99", duration.p99_ms}};

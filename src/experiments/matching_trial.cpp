@@ -68,6 +68,8 @@ RecordedProblem selectFeatures(const RecordedProblem& problem, const std::vector
     part.prior.ids.push_back(problem.prior.ids[slot]);
     part.templates.push_back(problem.templates[slot]);
     part.reference_px.push_back(problem.reference_px[slot]);
+    if (!problem.prior.noise_variances_px2.empty())
+      part.prior.noise_variances_px2.push_back(problem.prior.noise_variances_px2[slot]);
     part.prior.z.segment<2>(2 * i) = problem.prior.mean(from);
   }
   return part;
@@ -102,6 +104,7 @@ MatchingTrial tryMatcher(const Sequence& sequence, const RecordedProblem& proble
     const int match = trial.result.match_of_feature[slot];
     const Eigen::Vector2d& reference = problem.reference_px[slot];
     trial.spurious += static_cast<int>(search.matches(f).size()) - (match >= 0);
+    if (keep_trace) trial.matches.push_back(search.matches(f));
     trial.accepted_px.push_back(
         match >= 0 ? search.matches(f)[static_cast<std::size_t>(match)].pixel : unknownPixel());
     if (!reference.allFinite()) continue;

@@ -35,6 +35,7 @@ struct MatchingTrial {
   int right = 0, wrong = 0;      ///< accepted, and within / beyond 3 px of a known reference
   int missed = 0;                ///< not accepted though the reference is inside the search area
   std::vector<double> error_px;  ///< of each accepted with a known reference
+  std::vector<std::vector<SearchMatch>> matches;  ///< all that were met of each, with a trace
 };
 
 MatchingTrial tryMatcher(const Sequence& sequence, const RecordedProblem& problem,

@@ -104,6 +104,8 @@ Recording recordProblems(const Sequence& sequence, const RecordingOptions& optio
     problem.image = i;
     problem.prior = frame.prior;
     problem.prior.rates.clear();
+    problem.prior.wide_probability = 0.0;
+    problem.prior.wide_S.resize(0, 0);
     problem.templates = frame.templates;
     problem.other_ms = frame.timings_ms.predict + frame.timings_ms.measure +
                        frame.timings_ms.update + frame.timings_ms.map;

@@ -17,7 +17,7 @@ namespace active_matching_slam {
 /// the same input and none changes that of another.
 struct RecordedProblem {
   int image = 0;           ///< index into the sequence
-  MeasurementPrior prior;  ///< uniform rates
+  MeasurementPrior prior;  ///< uniform rates, one Gaussian
   std::vector<Template> templates;
   /// Where each feature is, by the truth of the simulator or by the reference matcher; NaN where
   /// that is not known, or the feature hidden or out of the image [px].

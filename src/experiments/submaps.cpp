@@ -36,8 +36,7 @@ double gainOf(const ThesisPartition& p) { return (p.chow_liu - p.naive) / (100.0
 
 ThesisPartition cutHere(const MutualInformationGraph& graph, const SubmapHierarchy& submaps,
                         int count) {
-  const SubmapPartition cut = cutIntoSubmaps(graph, submaps, count);
-  const SubmapLevel level = levelOfLabels(cut.submap_of_feature, cut.submaps, graphEdges(graph));
+  const SubmapLevel level = levelOf(cutIntoSubmaps(graph, submaps, count), graph);
   return {level.submaps, 100.0 * level.preserved_naive, 100.0 * level.preserved_chow_liu};
 }
 

@@ -72,16 +72,24 @@ inline Finding::Verdict verdict(bool agrees) {
 // The experiments.
 ExperimentResult runPinDown(Workbench& bench);
 ExperimentResult runInformationMeasures(Workbench& bench);
+ExperimentResult runInformationValues(Workbench& bench);
 ExperimentResult runHistogramSearch(Workbench& bench);
+ExperimentResult runMixtureSteps(Workbench& bench);
+ExperimentResult runLookAlikes(Workbench& bench);
 ExperimentResult runTrackingStep(Workbench& bench);
 ExperimentResult runFeaturesAndRate(Workbench& bench);
 ExperimentResult runInformationSteps(Workbench& bench);
+ExperimentResult runStateSpace(Workbench& bench);
+ExperimentResult runFrameClusters(Workbench& bench);
 ExperimentResult runSubmaps(Workbench& bench);
 ExperimentResult runSubmapsOverTime(Workbench& bench);
+ExperimentResult runSmoothness(Workbench& bench);
 ExperimentResult runFastMatching(Workbench& bench);
+ExperimentResult runTreeSteps(Workbench& bench);
 ExperimentResult runScalableMatching(Workbench& bench);
 ExperimentResult runTrajectories(Workbench& bench);
 ExperimentResult runMatchError(Workbench& bench);
+ExperimentResult runKeyframeMap(Workbench& bench);
 ExperimentResult runLucasKanade(Workbench& bench);
 
 }  // namespace active_matching_slam

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "active_matching_slam/filter/ekf.h"
@@ -162,6 +164,70 @@ void Ekf::removeFeatures(const std::vector<FeatureId>& ids) {
   features_.swap(kept);
   covariance_.keep(ranges);
   assignOffsets();
+}
+
+void Ekf::insertFeatures(const std::vector<FeatureState>& features, const Eigen::MatrixXd& own,
+                         const Eigen::MatrixXd& cross) {
+  const auto rows = 3 * static_cast<Eigen::Index>(features.size());
+  const int n = covariance_.size();
+  const auto refuse = [](const std::string& what) {
+    throw std::invalid_argument("features to insert: " + what);
+  };
+  if (own.rows() != rows || own.cols() != rows || cross.rows() != rows || cross.cols() != n)
+    refuse("covariances of " + std::to_string(own.rows()) + " x " + std::to_string(own.cols()) +
+           " and " + std::to_string(cross.rows()) + " x " + std::to_string(cross.cols()) + " for " +
+           std::to_string(features.size()) + " points and a state of " + std::to_string(n));
+  if (!own.allFinite() || !cross.allFinite()) refuse("a covariance is not finite");
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const std::string name = "feature " + std::to_string(features[i].id);
+    if (features[i].kind != FeatureKind::kPoint || !features[i].point_world.allFinite())
+      refuse(name + " is not a point");
+    if (features[i].id < 0 || features[i].id >= next_id_) refuse(name + " was never in the state");
+    if (find(features[i].id)) refuse(name + " is in the state");
+    if (i > 0 && features[i].id <= features[i - 1].id) refuse("ids are not ascending");
+  }
+  if (features.empty()) return;
+
+  std::vector<FeatureState> merged;
+  std::vector<Eigen::Index> place;  // of each row of the joint: what is there now, then `own`
+  for (int i = 0; i < cameraErrorSize(camera_); ++i) place.push_back(i);
+  std::size_t next = 0;
+  const auto insertBelow = [&](FeatureId id) {
+    for (; next < features.size() && features[next].id < id; ++next) {
+      merged.push_back(features[next]);
+      for (int k = 0; k < 3; ++k) place.push_back(n + 3 * static_cast<Eigen::Index>(next) + k);
+    }
+  };
+  for (const FeatureState& feature : features_) {
+    insertBelow(feature.id);
+    merged.push_back(feature);
+    for (int k = 0; k < feature.size(); ++k) place.push_back(feature.offset + k);
+  }
+  insertBelow(next_id_);
+
+  const auto size = static_cast<Eigen::Index>(place.size());
+  const auto P = covariance_.view();
+  Eigen::MatrixXd joint(size, size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    for (Eigen::Index i = j; i < size; ++i) {
+      const Eigen::Index a = place[i], b = place[j];
+      joint(i, j) = a < n ? (b < n ? P(a, b) : cross(b - n, a))
+                          : (b < n ? cross(a - n, b) : own(a - n, b - n));
+    }
+  }
+  covariance_.assign(joint);
+  features_.swap(merged);
+  assignOffsets();
+}
+
+void Ekf::inflate(const Eigen::MatrixXd& added) {
+  const int n = covariance_.size();
+  if (added.rows() != n || added.cols() != n || !added.allFinite())
+    throw std::invalid_argument("inflation of " + std::to_string(added.rows()) + " x " +
+                                std::to_string(added.cols()) + ", or not finite, for a state of " +
+                                std::to_string(n));
+  covariance_.view() += 0.5 * (added + added.transpose());
+  impulse_.reset();
 }
 
 std::vector<FeatureId> Ekf::convertToPoints() {

@@ -7,6 +7,13 @@
 #include "robust_update.h"
 
 namespace active_matching_slam {
+namespace {
+
+/// Linearisations at most where one is asked to start elsewhere. Cost: each takes as long as an
+/// update; they end as soon as they have converged.
+constexpr int kStartedIterations = 8;
+
+}  // namespace
 
 PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
                                                const std::vector<FeatureId>& ids, double sigma_px,
@@ -49,9 +56,18 @@ PredictedMeasurements Ekf::predictMeasurements(const CameraModel& camera,
 
 UpdateReport Ekf::update(const CameraModel& camera,
                          const std::vector<FeatureMeasurement>& measurements,
-                         const NoisePrior& noise, Corrected corrected) {
+                         const NoisePrior& noise, Corrected corrected,
+                         const Eigen::VectorXd& start) {
   UpdateReport report;
-  const CameraModel lens = camera.corrected(camera_.lens);
+  const bool is_started = start.size() == covariance_.size() && start.allFinite();
+  CameraState from = camera_;
+  std::vector<FeatureState> moved;
+  if (is_started) {
+    moved = features_;
+    applyError(start, from, moved);
+  }
+  const std::vector<FeatureState>& believed = is_started ? moved : features_;
+  const CameraModel lens = camera.corrected(from.lens);
   std::vector<UsableMeasurement> usable;
   std::vector<std::size_t> given;  // places of those in `measurements`
   report.redundancy.assign(measurements.size(), 0.0);
@@ -62,7 +78,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
     if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px) ||
         !m.noise_shape.allFinite())
       continue;
-    if (!projectFeature(lens, camera_, features_[index])) continue;
+    if (!projectFeature(lens, from, believed[index])) continue;
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
     usable.push_back(
         {index, m.pixel, sigma_px * sigma_px, std::max(1.0, m.variance_inflation), m.noise_shape});
@@ -81,7 +97,8 @@ UpdateReport Ekf::update(const CameraModel& camera,
   RobustUpdate correction(camera, camera_, features_, covariance_, usable, noise, impulse,
                           X.leftCols(rows));
   if (corrected == Corrected::kCamera) correction.considerMap();
-  if (!correction.solve(options_.update_iterations)) {
+  if (is_started) correction.startAt(start);
+  if (!correction.solve(is_started ? kStartedIterations : options_.update_iterations)) {
     report.healthy = false;
     return report;
   }

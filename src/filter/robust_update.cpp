@@ -190,7 +190,7 @@ bool RobustUpdate::step(bool first) {
   stack_.crossCovariance(covariance_, X_);
   Eigen::VectorXd innovation = z_ - stack_.pixels();
   Eigen::MatrixXd S, B = stack_.cameraJacobian().leftCols<kMotion>() * impulse_;
-  if (first) {
+  if (!is_moved_) {
     S = stack_.innovationCovariance(X_);
   } else {
     // An error of the prior is M = I + C L^T times as large at the mean reached: H M for H.
@@ -220,8 +220,16 @@ bool RobustUpdate::step(bool first) {
   X_.topRows<kMotion>() += more;
   added_.noalias() = more * GK.transpose();
   delta_.noalias() = X_ * llt_.solve(innovation);
-  if (is_map_considered_) delta_.tail(delta_.size() - cameraErrorSize(camera_)).setZero();
   if (!delta_.allFinite()) return false;
+  moveTo(delta_);
+  return true;
+}
+
+/// Puts the mean to where `delta` leads from the prior's.
+void RobustUpdate::moveTo(const Eigen::VectorXd& delta) {
+  is_moved_ = true;
+  delta_ = delta;
+  if (is_map_considered_) delta_.tail(delta_.size() - cameraErrorSize(camera_)).setZero();
   camera_ = prior_camera_;
   features_ = prior_features_;
   applyError(delta_, camera_, features_);
@@ -229,8 +237,9 @@ bool RobustUpdate::step(bool first) {
   // The gauge is the map's: where that stands still there is none to be transported.
   if (!is_map_considered_)
     C_ = gaugeGenerators(camera_, features_, covariance_.size()) - prior_gauge_;
-  return true;
 }
+
+void RobustUpdate::startAt(const Eigen::VectorXd& start) { moveTo(start); }
 
 bool RobustUpdate::isLinearEnough(const Eigen::VectorXd& expected) const {
   double sum = 0.0;

@@ -48,6 +48,9 @@ class RobustUpdate {
   /// Corrected::kCamera. Before solve().
   void considerMap() { is_map_considered_ = true; }
 
+  /// The first linearisation is made where the error state `start` leads to. Before solve().
+  void startAt(const Eigen::VectorXd& start);
+
   /// False when S could not be factorised or the result is not finite: nothing is to be fused.
   bool solve(int iterations);
 
@@ -74,6 +77,7 @@ class RobustUpdate {
 
  private:
   bool linearise();
+  void moveTo(const Eigen::VectorXd& delta);
   bool step(bool first);
   void addNoise(Eigen::MatrixXd& S);
   bool estimateNoise(const Eigen::VectorXd& innovation, Eigen::MatrixXd& S);
@@ -106,6 +110,7 @@ class RobustUpdate {
   double noise_scale_ = 1.0, noise_degrees_ = 0.0;
   ImpulseEstimate linear_impulse_, angular_impulse_;
   bool is_map_considered_ = false;
+  bool is_moved_ = false;                 ///< the mean to linearise about is not the prior's
   std::vector<Eigen::Matrix4d> moments_;  ///< relativeCovariance() of the prior; zero for points
   double nis_ = 0.0;
 };

@@ -1,5 +1,6 @@
 #include "active_matching_slam/filter/state_error.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 
 #include "active_matching_slam/math/rotation.h"
@@ -42,6 +43,33 @@ void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& cam
     turnBearing(delta.segment<2>(feature.bearingRow()), theta, feature);
     feature.inverse_depth += delta[feature.inverseDepthRow()];
   }
+}
+
+Eigen::VectorXd errorOfMotion(const Eigen::Isometry3d& T_new_old, const CameraState& camera,
+                              const std::vector<FeatureState>& features,
+                              const std::vector<FeatureId>& carried, int state_size) {
+  Eigen::VectorXd delta = Eigen::VectorXd::Zero(state_size);
+  const Eigen::Matrix3d R = T_new_old.linear();
+  const Eigen::Vector3d theta = vectorFromRotation(Eigen::Quaterniond(R));
+  const Eigen::Matrix3d J_inverse = leftJacobian(theta).inverse();
+  const auto move = [&](const Eigen::Vector3d& p, int row) {
+    delta.segment<3>(row) = J_inverse * (T_new_old * p - p);
+  };
+  delta.segment<3>(CameraError::kRotation) = theta;
+  move(camera.position_world, CameraError::kPosition);
+  delta.segment<3>(CameraError::kVelocity) =
+      J_inverse * (R * camera.velocity_world - camera.velocity_world);
+  for (const FeatureState& feature : features) {
+    if (!std::binary_search(carried.begin(), carried.end(), feature.id)) continue;
+    if (feature.kind == FeatureKind::kPoint) {
+      move(feature.point_world, feature.offset);
+      continue;
+    }
+    if (feature.hasAnchorError()) move(feature.anchor_world, feature.offset);
+    delta.segment<2>(feature.bearingRow()) =
+        feature.tangentBasis().transpose() * theta.cross(feature.bearing_world);
+  }
+  return delta;
 }
 
 Eigen::Matrix<double, 2, 3> bearingGauge(const FeatureState& feature) {

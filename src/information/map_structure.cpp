@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "active_matching_slam/information/submap_cut.h"
+
 namespace active_matching_slam {
 
 void MapStructure::addFrame(const std::vector<std::int64_t>& ids,
@@ -24,11 +26,8 @@ void MapStructure::clear() {
 MapStructure::Snapshot MapStructure::snapshot(const SubmapOptions& options) {
   auto graph = std::make_shared<MutualInformationGraph>(accumulator_.links());
   auto submaps = std::make_shared<SubmapHierarchy>(buildSubmapHierarchy(*graph));
-  if (options.isRequest()) {
-    SubmapPartition partition = requestedSubmaps(*graph, *submaps, options);
-    submaps->requested = levelOfLabels(std::move(partition.submap_of_feature), partition.submaps,
-                                       graphEdges(*graph));
-  }
+  if (options.isRequest())
+    submaps->requested = levelOf(requestedSubmaps(*graph, *submaps, options), *graph);
   tracker_.relabel(*submaps);
   return {std::move(graph), std::move(submaps)};
 }

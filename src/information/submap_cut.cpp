@@ -208,4 +208,8 @@ SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
   return tree.partition();
 }
 
+SubmapLevel levelOf(SubmapPartition cut, const MutualInformationGraph& graph) {
+  return levelOfLabels(std::move(cut.submap_of_feature), cut.submaps, graphEdges(graph));
+}
+
 }  // namespace active_matching_slam

@@ -76,6 +76,16 @@ void FeatureMap::retire(const std::vector<FeatureId>& ids) {
   features_.erase(end, features_.end());
 }
 
+std::vector<MapFeature> FeatureMap::take(const std::vector<FeatureId>& ids) {
+  std::vector<MapFeature> taken, kept;
+  for (MapFeature& feature : features_) {
+    const bool is_taken = std::find(ids.begin(), ids.end(), feature.id) != ids.end();
+    (is_taken ? taken : kept).push_back(std::move(feature));
+  }
+  features_.swap(kept);
+  return taken;
+}
+
 void FeatureMap::rescale(double factor) {
   for (MapFeature& feature : features_) feature.patch.T_world_camera.translation() *= factor;
 }

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 #include <stdexcept>
 
 #include "active_matching_slam/image/image_options.h"
@@ -13,7 +14,7 @@ namespace {
 
 /// Both line ends reveal a transfer as text.
 constexpr char kMagic[9] = "AMSMAP\r\n";
-constexpr std::uint32_t kVersion = 5;
+constexpr std::uint32_t kVersion = 6;
 constexpr std::size_t kHeaderSize = 8 + 4 + 4 + 8;
 constexpr std::size_t kMaximumName = 1024, kMaximumDistortion = 16;
 constexpr std::size_t kMinimumFeature = 8 + 1 + 13 * 8;  ///< bytes of a FeatureState
@@ -260,6 +261,8 @@ void checkMapFeature(const MapFeature& feature, const MapFileContent& content) {
     throw std::invalid_argument(name + " has a rate of matches outside [0, 1]");
 }
 
+void checkSubmaps(const MapFileContent& content);
+
 void check(const MapFileContent& content) {
   checkCalibration(content.camera);
   ImageOptions image;
@@ -278,6 +281,7 @@ void check(const MapFileContent& content) {
       throw std::invalid_argument("map and filter hold different features");
     checkMapFeature(content.map[i], content);
   }
+  checkSubmaps(content);
 }
 
 /// Bytes of a link of the graph.
@@ -313,6 +317,91 @@ void write(const MutualInformationGraph& graph, Writer* out) {
   }
 }
 
+void write(const StoredSubmap& submap, Writer* out) {
+  out->integer(submap.id);
+  out->real(submap.lost_bits);
+  for (const auto* ids : {&submap.ids, &submap.given_ids}) {
+    out->integer(static_cast<std::int64_t>(ids->size()));
+    for (const FeatureId id : *ids) out->integer(id);
+  }
+  out->reals(submap.mean);
+  out->reals(submap.given_mean);
+  out->reals(submap.K);
+  out->reals(submap.Q);
+}
+
+StoredSubmap readSubmap(Reader* in) {
+  StoredSubmap submap;
+  submap.id = in->smallInteger("number of a submap", -1, std::numeric_limits<int>::max() - 1);
+  submap.lost_bits = in->real();
+  for (auto* ids : {&submap.ids, &submap.given_ids}) {
+    ids->resize(static_cast<std::size_t>(in->integer(
+        "number of features of a submap", 0, static_cast<std::int64_t>(in->remaining() / 8))));
+    for (FeatureId& id : *ids) id = in->integer();
+  }
+  const std::size_t rows = 3 * submap.ids.size();
+  const std::size_t columns =
+      rows == 0 ? 0 : CameraError::kCalibrationSize + 3 * submap.given_ids.size();
+  // Known before anything is allocated.
+  if (rows > 0 && in->remaining() / 8 / rows < columns + rows)
+    throw std::runtime_error("a submap ends too early");
+  const auto n = static_cast<Eigen::Index>(rows), m = static_cast<Eigen::Index>(columns);
+  submap.mean.resize(n);
+  submap.given_mean.resize(m);
+  submap.K.resize(n, m);
+  submap.Q.resize(n, n);
+  in->reals(submap.mean);
+  in->reals(submap.given_mean);
+  in->reals(submap.K);
+  in->reals(submap.Q);
+  return submap;
+}
+
+/// Features of trunk and submaps hang on what is there, and each is there once.
+void checkSubmaps(const MapFileContent& content) {
+  const auto refuse = [](const std::string& what) { throw std::invalid_argument(what); };
+  std::set<FeatureId> active, frozen;
+  for (const FeatureState& feature : content.features) active.insert(feature.id);
+  std::set<FeatureId> anchors = active;
+  const auto checkOne = [&](const StoredSubmap& submap, const std::string& name) {
+    const auto rows = 3 * static_cast<Eigen::Index>(submap.ids.size());
+    const auto columns = rows == 0 ? 0
+                                   : CameraError::kCalibrationSize +
+                                         3 * static_cast<Eigen::Index>(submap.given_ids.size());
+    if (submap.mean.size() != rows || submap.given_mean.size() != columns ||
+        submap.K.rows() != rows || submap.K.cols() != columns || submap.Q.rows() != rows ||
+        submap.Q.cols() != rows)
+      refuse(name + " has matrices of another size than its features");
+    if (!submap.mean.allFinite() || !submap.given_mean.allFinite() || !submap.K.allFinite() ||
+        !submap.Q.allFinite() || !std::isfinite(submap.lost_bits))
+      refuse(name + " holds a number that is not finite");
+    if (rows > 0 && !(submap.Q.diagonal().minCoeff() >= 0.0))
+      refuse(name + " has a negative variance");
+    for (const FeatureId id : submap.ids)
+      if (id < 0 || id >= content.next_id || active.count(id) > 0 || !frozen.insert(id).second)
+        refuse(name + " holds feature " + std::to_string(id) + ", which is unknown or elsewhere");
+    for (const FeatureId id : submap.given_ids)
+      if (anchors.count(id) == 0)
+        refuse(name + " hangs on feature " + std::to_string(id) + ", which is not in the map");
+  };
+  checkOne(content.trunk, "the trunk");
+  anchors.insert(content.trunk.ids.begin(), content.trunk.ids.end());
+  int last = -1;
+  for (const StoredSubmap& submap : content.submaps) {
+    if (submap.id <= last || submap.id >= content.next_submap)
+      refuse("submap " + std::to_string(submap.id) + " is out of order");
+    last = submap.id;
+    checkOne(submap, "submap " + std::to_string(submap.id));
+  }
+  if (frozen.size() != content.frozen.size())
+    refuse("submaps and their features are different in number");
+  auto expected = frozen.begin();
+  for (const MapFeature& feature : content.frozen) {
+    if (feature.id != *expected++) refuse("submaps and their features are different ones");
+    checkMapFeature(feature, content);
+  }
+}
+
 MapFileContent readContent(std::uint32_t version, Reader* in) {
   MapFileContent content;
   content.camera = readCamera(in);
@@ -332,6 +421,18 @@ MapFileContent readContent(std::uint32_t version, Reader* in) {
   }
   for (std::size_t i = 0; i < count; ++i) content.map.push_back(readMapFeature(version, in));
   if (version >= 5) content.graph = readGraph(in);
+  if (version >= 6) {
+    content.trunk = readSubmap(in);
+    content.next_submap =
+        in->smallInteger("next number of a submap", 0, std::numeric_limits<int>::max());
+    // The least that a submap takes: id, bits, two counts.
+    const auto submaps =
+        in->integer("number of submaps", 0, static_cast<std::int64_t>(in->remaining() / (4 * 8)));
+    for (std::int64_t k = 0; k < submaps; ++k) content.submaps.push_back(readSubmap(in));
+    const auto frozen = in->integer("number of features laid aside", 0,
+                                    static_cast<std::int64_t>(in->remaining() / 8));
+    for (std::int64_t k = 0; k < frozen; ++k) content.frozen.push_back(readMapFeature(version, in));
+  }
   // Nothing but the lower triangle is left; so its size is known before it is allocated. Version 1
   // has no calibration in it.
   const std::size_t calibration = version < 2 ? CameraError::kCalibrationSize : 0;
@@ -377,6 +478,12 @@ std::string serializeMap(const MapFileContent& content) {
   for (const FeatureState& feature : content.features) write(feature, &body);
   for (const MapFeature& feature : content.map) write(feature, &body);
   write(content.graph, &body);
+  write(content.trunk, &body);
+  body.integer(content.next_submap);
+  body.integer(static_cast<std::int64_t>(content.submaps.size()));
+  for (const StoredSubmap& submap : content.submaps) write(submap, &body);
+  body.integer(static_cast<std::int64_t>(content.frozen.size()));
+  for (const MapFeature& feature : content.frozen) write(feature, &body);
   for (Eigen::Index j = 0; j < content.covariance.cols(); ++j)
     for (Eigen::Index i = j; i < content.covariance.rows(); ++i)
       body.real(content.covariance(i, j));

@@ -51,9 +51,14 @@ Relocaliser::Relocaliser(const RelocaliserOptions& options, const MapOptions& ma
 std::optional<Relocalisation> Relocaliser::find(const CameraModel& camera, const cv::Mat& image,
                                                 const Ekf& filter, const FeatureMap& map,
                                                 const ImageMask& mask) const {
+  return find(camera, image, usableLandmarks(filter, map), mask);
+}
+
+std::optional<Relocalisation> Relocaliser::find(const CameraModel& camera, const cv::Mat& image,
+                                                const std::vector<Landmark>& landmarks,
+                                                const ImageMask& mask) const {
   if (image.type() != CV_8UC1 || image.cols != camera.width() || image.rows != camera.height())
     return std::nullopt;
-  const std::vector<Landmark> landmarks = usableLandmarks(filter, map);
   if (static_cast<int>(landmarks.size()) < options_.minimum_inliers) return std::nullopt;
   const auto T_world_camera = solvePose(camera, matchDescriptors(image, landmarks, mask));
   if (!T_world_camera) return std::nullopt;
@@ -110,8 +115,7 @@ bool Relocaliser::canFind(const Ekf& filter, const FeatureMap& map) const {
   return static_cast<int>(usableLandmarks(filter, map).size()) >= options_.minimum_inliers;
 }
 
-std::vector<Relocaliser::Landmark> Relocaliser::usableLandmarks(const Ekf& filter,
-                                                                const FeatureMap& map) const {
+std::vector<Landmark> Relocaliser::usableLandmarks(const Ekf& filter, const FeatureMap& map) const {
   std::vector<Landmark> landmarks;
   for (const MapFeature& feature : map.features()) {
     const FeatureState* state = filter.find(feature.id);
@@ -119,7 +123,7 @@ std::vector<Relocaliser::Landmark> Relocaliser::usableLandmarks(const Ekf& filte
     if (state->kind == FeatureKind::kInverseDepth &&
         !(filter.sigmaInverseDepth(*state) <= options_.maximum_depth_sigma * state->inverse_depth))
       continue;
-    landmarks.push_back({&feature, state});
+    landmarks.push_back({&feature, *state});
   }
   return landmarks;
 }
@@ -163,7 +167,7 @@ std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
   std::vector<cv::Point2d> ideal;
   for (const Sighting& sighting : sightings) {
     const auto ray = camera.unproject(sighting.pixel);
-    const Eigen::Vector3d position = sighting.landmark->state->position();
+    const Eigen::Vector3d position = sighting.landmark->state.position();
     if (!ray || !position.allFinite() || !(ray->head<2>().norm() < kMaximumSlope * ray->z()))
       continue;
     points.emplace_back(position.x(), position.y(), position.z());
@@ -199,7 +203,7 @@ int Relocaliser::searchVisible(const CameraModel& camera, const cv::Mat& image,
   std::vector<SearchEllipse> ellipses;
   for (const Landmark& landmark : landmarks) {
     const auto view = predictPatchView(landmark.feature->patch, camera, T_world_camera,
-                                       homogeneousPosition(*landmark.state));
+                                       homogeneousPosition(landmark.state));
     Template expected;
     if (!view || !camera.isInImage(view->pixel, image_options_.border_px) ||
         !mask.isSearched(view->pixel) || view->view_angle_rad > maximum_angle ||
@@ -234,7 +238,7 @@ Eigen::Isometry3d Relocaliser::refinePose(const CameraModel& camera,
     for (const Sighting& sighting : sightings) {
       Eigen::Matrix<double, 2, 3> d_pixel_d_point;
       const Eigen::Vector3d point =
-          R_camera_world * (sighting.landmark->state->position() - T_world_camera.translation());
+          R_camera_world * (sighting.landmark->state.position() - T_world_camera.translation());
       const auto pixel = camera.project(point, &d_pixel_d_point);
       if (!pixel) continue;
       // The pose gains (dt, dr) in the camera's frame: the point moves by -dt + [point]x dr.
@@ -259,7 +263,7 @@ double Relocaliser::residual(const CameraModel& camera, const Sighting& sighting
                              const Eigen::Isometry3d& T_world_camera) const {
   const Eigen::Vector3d point =
       T_world_camera.linear().transpose() *
-      (sighting.landmark->state->position() - T_world_camera.translation());
+      (sighting.landmark->state.position() - T_world_camera.translation());
   const auto pixel = camera.project(point);
   return pixel ? (*pixel - sighting.pixel).norm() : std::numeric_limits<double>::infinity();
 }

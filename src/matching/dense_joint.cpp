@@ -13,7 +13,7 @@ struct Factor {
   std::vector<double> values;
 };
 
-struct DenseConditional : Conditional {
+struct DenseConditional : ConditionalJoint {
   std::shared_ptr<Factor> factor;
   int columns = 0;
 };
@@ -52,8 +52,8 @@ class DenseJoint : public Joint {
   }
 
  private:
-  std::shared_ptr<Conditional> derive(const std::shared_ptr<const Conditional>& base,
-                                      int feature) const override {
+  std::shared_ptr<ConditionalJoint> derive(const std::shared_ptr<const ConditionalJoint>& base,
+                                           int feature) const override {
     const auto& given = static_cast<const DenseConditional&>(*base);
     auto derived = std::make_shared<DenseConditional>();
     inherit(*derived, given, feature);

@@ -11,18 +11,18 @@ Joint::Joint(Eigen::VectorXd noise_variances, Eigen::VectorXd precision_determin
     : noise_variances_(std::move(noise_variances)),
       precision_determinant_(std::move(precision_determinant)) {}
 
-std::shared_ptr<const Conditional> Joint::measure(const std::shared_ptr<const Conditional>& given,
-                                                  int feature) const {
+std::shared_ptr<const ConditionalJoint> Joint::measure(
+    const std::shared_ptr<const ConditionalJoint>& given, int feature) const {
   for (const auto& [measured, known] : given->derived_)
     if (measured == feature)
       if (auto alive = known.lock()) return alive;
-  std::shared_ptr<Conditional> derived = derive(given, feature);
+  std::shared_ptr<ConditionalJoint> derived = derive(given, feature);
   derived->measured_precision_ = given->marginal(feature).covariance.inverse();
   given->derived_.emplace_back(feature, derived);
   return derived;
 }
 
-void Joint::setMarginal(Conditional& conditional, int feature,
+void Joint::setMarginal(ConditionalJoint& conditional, int feature,
                         const Eigen::Matrix2d& covariance) const {
   Marginal& marginal = conditional.marginals_[static_cast<std::size_t>(feature)];
   marginal.covariance = covariance;
@@ -32,7 +32,8 @@ void Joint::setMarginal(Conditional& conditional, int feature,
       proper ? informationBits(marginal.determinant, precision_determinant_(feature)) : 0.0;
 }
 
-void Joint::inherit(Conditional& conditional, const Conditional& given, int feature) const {
+void Joint::inherit(ConditionalJoint& conditional, const ConditionalJoint& given,
+                    int feature) const {
   const auto slot = static_cast<std::size_t>(feature);
   conditional.marginals_ = given.marginals_;
   conditional.measured_ = given.measured_;

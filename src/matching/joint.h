@@ -18,9 +18,9 @@ struct Marginal {
 
 /// The joint covariance given that some features are measured. It depends on which, not on where
 /// (siblings in a mixture share it). Immutable, apart from the list of what was derived from it.
-class Conditional {
+class ConditionalJoint {
  public:
-  virtual ~Conditional() = default;
+  virtual ~ConditionalJoint() = default;
 
   const Marginal& marginal(int feature) const {
     return marginals_[static_cast<std::size_t>(feature)];
@@ -41,7 +41,7 @@ class Conditional {
   std::vector<int> touched_;
   std::vector<Eigen::Matrix2d> cross_;
   Eigen::Matrix2d measured_precision_ = Eigen::Matrix2d::Zero();
-  mutable std::vector<std::pair<int, std::weak_ptr<const Conditional>>> derived_;
+  mutable std::vector<std::pair<int, std::weak_ptr<const ConditionalJoint>>> derived_;
 };
 
 /// A joint Gaussian of image points that can be conditioned: all that Active Matching's mixture
@@ -51,32 +51,33 @@ class Joint {
   virtual ~Joint() = default;
 
   int size() const { return static_cast<int>(precision_determinant_.size()); }
-  const std::shared_ptr<const Conditional>& prior() const { return prior_; }
+  const std::shared_ptr<const ConditionalJoint>& prior() const { return prior_; }
   /// `given` with one more feature measured (proper, not measured yet).
-  std::shared_ptr<const Conditional> measure(const std::shared_ptr<const Conditional>& given,
-                                             int feature) const;
+  std::shared_ptr<const ConditionalJoint> measure(
+      const std::shared_ptr<const ConditionalJoint>& given, int feature) const;
 
  protected:
   /// `noise_variances`: F, of R, the marginal of a measured feature. `precision_determinant`: F,
   /// |L_ff|.
   Joint(Eigen::VectorXd noise_variances, Eigen::VectorXd precision_determinant);
-  virtual std::shared_ptr<Conditional> derive(const std::shared_ptr<const Conditional>& given,
-                                              int feature) const = 0;
+  virtual std::shared_ptr<ConditionalJoint> derive(
+      const std::shared_ptr<const ConditionalJoint>& given, int feature) const = 0;
   /// Sets a marginal with all that follows from it.
-  void setMarginal(Conditional& conditional, int feature, const Eigen::Matrix2d& covariance) const;
+  void setMarginal(ConditionalJoint& conditional, int feature,
+                   const Eigen::Matrix2d& covariance) const;
   /// Copies marginals and flags of `given` and marks `feature` as measured.
-  void inherit(Conditional& conditional, const Conditional& given, int feature) const;
-  void setPrior(std::shared_ptr<Conditional> prior) { prior_ = std::move(prior); }
+  void inherit(ConditionalJoint& conditional, const ConditionalJoint& given, int feature) const;
+  void setPrior(std::shared_ptr<ConditionalJoint> prior) { prior_ = std::move(prior); }
 
-  static std::vector<Marginal>& marginalsOf(Conditional& c) { return c.marginals_; }
-  static std::vector<char>& measuredOf(Conditional& c) { return c.measured_; }
-  static std::vector<int>& touchedOf(Conditional& c) { return c.touched_; }
-  static std::vector<Eigen::Matrix2d>& crossOf(Conditional& c) { return c.cross_; }
+  static std::vector<Marginal>& marginalsOf(ConditionalJoint& c) { return c.marginals_; }
+  static std::vector<char>& measuredOf(ConditionalJoint& c) { return c.measured_; }
+  static std::vector<int>& touchedOf(ConditionalJoint& c) { return c.touched_; }
+  static std::vector<Eigen::Matrix2d>& crossOf(ConditionalJoint& c) { return c.cross_; }
 
  private:
   Eigen::VectorXd noise_variances_;
   Eigen::VectorXd precision_determinant_;
-  std::shared_ptr<const Conditional> prior_;
+  std::shared_ptr<const ConditionalJoint> prior_;
 };
 
 /// The full covariance. A measurement is one step of an incremental, left-looking Cholesky:

@@ -72,7 +72,7 @@ struct Hypothesis {
   bool was_searched = false;
   double log_merged = 0.0;               ///< what merged siblings added to log_weight
   const PriorGaussian* prior = nullptr;  ///< that it descends from
-  std::shared_ptr<const Conditional> joint;
+  std::shared_ptr<const ConditionalJoint> joint;
   std::vector<Eigen::Vector2d> mean;      ///< F, the match for a fused feature [px]
   std::vector<int> match;                 ///< F, -1: not fused
   std::vector<double> match_probability;  ///< F, posterior of the match among those merged with it

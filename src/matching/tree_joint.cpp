@@ -6,7 +6,7 @@
 namespace active_matching_slam {
 namespace {
 
-struct TreeConditional : Conditional {
+struct TreeConditional : ConditionalJoint {
   std::vector<Eigen::Matrix2d> edge;  ///< S_ij of each edge, i = first, j = second
 };
 
@@ -48,8 +48,8 @@ class TreeJoint : public Joint {
     Eigen::Matrix2d old_precision, shrinkage, cross;  // S^-1 before, S before - S after
   };
 
-  std::shared_ptr<Conditional> derive(const std::shared_ptr<const Conditional>& base,
-                                      int feature) const override {
+  std::shared_ptr<ConditionalJoint> derive(const std::shared_ptr<const ConditionalJoint>& base,
+                                           int feature) const override {
     const auto& given = static_cast<const TreeConditional&>(*base);
     auto derived = std::make_shared<TreeConditional>();
     inherit(*derived, given, feature);

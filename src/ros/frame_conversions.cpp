@@ -70,6 +70,15 @@ ams_msgs::TrackingState toTrackingStateMsg(const TrackedFrame& frame,
   message.resets = frame.resets;
   message.times_lost = frame.times_lost;
   message.map = frame.map;
+  message.map_epoch = frame.map_epoch;
+  const Eigen::Quaterniond turn(frame.map_jump.linear());
+  message.map_jump.translation.x = frame.map_jump.translation().x();
+  message.map_jump.translation.y = frame.map_jump.translation().y();
+  message.map_jump.translation.z = frame.map_jump.translation().z();
+  message.map_jump.rotation.x = turn.x();
+  message.map_jump.rotation.y = turn.y();
+  message.map_jump.rotation.z = turn.z();
+  message.map_jump.rotation.w = turn.w();
   message.jumps = frame.jumps;
   message.quality = static_cast<float>(finiteOrZero(frame.quality));
   message.quality_reason = frame.quality_reason;
@@ -134,6 +143,14 @@ ams_msgs::MatchingStatistics toStatisticsMsg(const TrackedFrame& frame,
   message.features_converted = frame.features_converted;
   message.features_retired = frame.features_retired;
   message.retired_total = frame.retired_total;
+  if (frame.frozen) {
+    message.submaps = frame.frozen->submaps;
+    message.frozen_features = static_cast<std::uint32_t>(frame.frozen->features.size());
+    message.trunk_features = frame.frozen->trunk_features;
+    message.submap_lost_bits = finiteOrZero(frame.frozen->lost_bits);
+    message.submaps_found = frame.frozen->found;
+  }
+  message.loops = frame.loops;
   message.dropped_images = dropped_images;
   message.repeated_image = frame.repeated_image;
   message.predict_ms = frame.timings_ms.predict;

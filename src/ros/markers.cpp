@@ -188,6 +188,23 @@ MarkerArray featureMarkers(const TrackedFrame& frame, const std_msgs::Header& he
   }
   keepIfAny(&markers, std::move(rays));
   keepIfAny(&markers, std::move(points));
+  if (frame.frozen) {
+    Marker frozen = makePoints(header, "frozen", 0.012 * size);
+    Marker separators = makePoints(header, "separators", 0.02 * size);
+    for (const FrozenFeature& feature : frame.frozen->features) {
+      if (!feature.position_world.allFinite()) continue;
+      if (feature.submap >= 0)
+        addPoint(&frozen, feature.position_world, submapColor(feature.submap));
+      if (feature.is_separator) addPoint(&separators, feature.position_world, color(1.0, 0.8, 0.2));
+    }
+    for (const TrackedFeature& feature : frame.features) {
+      const auto& active = frame.frozen->active_separators;
+      if (isShowable(feature) && std::binary_search(active.begin(), active.end(), feature.id))
+        addPoint(&separators, feature.position_world, color(1.0, 0.8, 0.2));
+    }
+    keepIfAny(&markers, std::move(frozen));
+    keepIfAny(&markers, std::move(separators));
+  }
   return markers;
 }
 

@@ -109,6 +109,9 @@ void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->times_lost = times_lost_;
   frame->map = map_number_;
   frame->jumps = jumps_;
+  frame->loops = loops_;
+  frame->map_epoch = map_epoch_;
+  if (submaps_.isEnabled()) frame->frozen = submaps_.describe(filter_);
   frame->quality = quality_.quality();
   frame->quality_reason = quality_.cause();
   frame->accelerations = motion_noise_.expected();

@@ -70,6 +70,9 @@ void Tracker::Implementation::abandonMap(const std::string& reason) {
 
 void Tracker::Implementation::clearMap() {
   map_.clear();
+  submaps_.clear();
+  loop_witness_.clear();
+  loop_undo_.reset();
   map_monitor_.reset();
   initialiser_.end();
   structure_.clear();
@@ -98,6 +101,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
   noise_.setOptions(options.filter);
   motion_noise_.setOptions(options.filter);
   relocaliser_ = Relocaliser(options.relocaliser, options.map, options.image);
+  submaps_.setOptions(options.submap_filter);
   options_ = options;
 }
 
@@ -118,6 +122,9 @@ void Tracker::Implementation::rescale(double factor) {
 void Tracker::Implementation::rescaleBesideFilter(double factor) {
   motion_noise_.rescale(factor);
   map_.rescale(factor);
+  submaps_.rescale(factor);
+  loop_witness_.clear();
+  loop_undo_.reset();
   initialiser_.rescale(factor);
   T_world_reference_.translation() *= factor;
   scale_finder_.reset();
@@ -172,7 +179,9 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   updateTrackingState(current);
   findScale(frame);
   scaleByGround(frame);
+  if (watchLoop(frame)) return current;
   retakePatches(current);
+  lookForLoop(image, frame);
   maintainMap(image, frame);
   followTarget(image, frame);
   frame->timings_ms.map = stage.lap();

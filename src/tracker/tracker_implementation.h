@@ -21,6 +21,8 @@
 #include "active_matching_slam/tracker/tracker.h"
 #include "active_matching_slam/tracker/tracking_quality.h"
 #include "frame_noise.h"
+#include "loop_finder.h"
+#include "submap_keeper.h"
 
 namespace active_matching_slam {
 
@@ -32,9 +34,9 @@ constexpr int kRelocalisationPeriodFrames = 4;
 constexpr double kClockStep_s = 1.0;
 
 /// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
-/// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_lost.cpp and
-/// tracked_frame.cpp. What is known of the frame in hand is passed from one to the next
-/// (FrameState); members hold what lasts.
+/// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_submaps.cpp,
+/// tracker_lost.cpp and tracked_frame.cpp. What is known of the frame in hand is passed from one to
+/// the next (FrameState); members hold what lasts.
 class Tracker::Implementation {
  public:
   Implementation(const CameraModel& camera, const TrackerOptions& options)
@@ -45,7 +47,8 @@ class Tracker::Implementation {
         noise_(options.filter),
         motion_noise_(options.filter),
         cascade_(options.matcher, options.cascade),
-        relocaliser_(options.relocaliser, options.map, options.image) {
+        relocaliser_(options.relocaliser, options.map, options.image),
+        submaps_(options.submap_filter) {
     checkTrackerOptions(options);
     if (options.motion.hasGyro()) filter_.estimateGyroBias(options.motion.gyro_bias_sigma_rps);
   }
@@ -117,6 +120,14 @@ class Tracker::Implementation {
   void observeStructure(const std::vector<VisibleFeature>& visible);
   void updateStructure(TrackedFrame* frame);
   std::vector<FeatureId> leastInformative(int count) const;
+  int mostFeatures() const;
+  void keepSubmaps(const TrackedFrame& frame);
+  std::vector<Eigen::Vector2d> frozenPixels() const;
+  void lookForLoop(const cv::Mat& image, TrackedFrame* frame);
+  void closeLoop(int submap, const Relocalisation& found, const CameraOffset& offset,
+                 TrackedFrame* frame);
+  bool watchLoop(TrackedFrame* frame);
+  bool relocaliseInSubmaps(const cv::Mat& image, TrackedFrame* frame);
   void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);
@@ -153,7 +164,19 @@ class Tracker::Implementation {
     FeatureMap map;
     MapMonitor monitor;
     ScaleSource scale_source;
+    SubmapKeeper submaps;
   };
+  /// All that closing a loop changed, as it was before, and how images have fared since.
+  struct LoopUndo {
+    Ekf filter;
+    FeatureMap map;
+    SubmapKeeper submaps;
+    int images;
+    double nis;
+    int degrees;
+  };
+  void takeBack(LoopUndo undo);
+
   LostMap storeMap();
   void takeMap(LostMap stored);
 
@@ -180,6 +203,10 @@ class Tracker::Implementation {
   Target target_;
   MatchCascade cascade_;
   Relocaliser relocaliser_;
+  SubmapKeeper submaps_;
+  LoopWitness loop_witness_;
+  std::optional<LoopUndo> loop_undo_;
+  int loops_ = 0, map_epoch_ = 0;
   MapStructure structure_;
   MapStructure::Snapshot structure_snapshot_;
 

@@ -100,7 +100,8 @@ void Tracker::Implementation::lookForCamera(const std::string& reason) {
 void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame) {
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
   // Lost soon after the start: nothing is known but directions.
-  if (options_.mapping && !relocaliser_.canFind(filter_, map_)) {
+  if (options_.mapping && !relocaliser_.canFind(filter_, map_) &&
+      submaps_.tree().leaves().empty()) {
     abandonMap("lost with a map that has too few features of known depth: started anew");
     return;
   }
@@ -111,14 +112,16 @@ void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedF
     abandonMap(reason.str());
     return;
   }
-  if (frame->index % kRelocalisationPeriodFrames == 0 && relocalise(image, frame)) return;
+  if (frame->index % kRelocalisationPeriodFrames == 0 &&
+      (relocalise(image, frame) || (options_.mapping && relocaliseInSubmaps(image, frame))))
+    return;
   if (options_.mapping && options_.new_map_when_lost_after_s > 0.0 &&
       lost_s >= options_.new_map_when_lost_after_s && !awaits_loaded_map_ && !is_pose_given_)
     beginNewMap(image, frame);
 }
 
 Tracker::Implementation::LostMap Tracker::Implementation::storeMap() {
-  return {map_number_, lost_stamp_s_, filter_, noise_, map_, map_monitor_, scale_source_};
+  return {map_number_, lost_stamp_s_, filter_, noise_, map_, map_monitor_, scale_source_, submaps_};
 }
 
 void Tracker::Implementation::takeMap(LostMap stored) {
@@ -130,6 +133,10 @@ void Tracker::Implementation::takeMap(LostMap stored) {
   map_ = std::move(stored.map);
   map_monitor_ = stored.monitor;
   scale_source_ = stored.scale_source;
+  submaps_ = std::move(stored.submaps);
+  submaps_.setOptions(options_.submap_filter);
+  loop_witness_.clear();
+  loop_undo_.reset();
   scale_finder_.reset();
   motion_noise_.reset();
   structure_.clear();
@@ -275,6 +282,7 @@ void Tracker::Implementation::saveMap(const std::string& path) const {
   content.next_id = filter_.nextId();
   content.scale_source = static_cast<int>(scale_source_);
   content.graph = structure_.graph();
+  submaps_.save(filter_, &content);
   content.template_size_px = options_.image.template_size_px;
   content.source_patch_size_px = options_.image.source_patch_size_px;
   writeMapFile(path, content);
@@ -294,6 +302,9 @@ void Tracker::Implementation::loadMap(const std::string& path) {
     refuse("the source of scale is unknown");
   filter_.restore(content.camera_state, content.features, content.covariance, content.next_id);
   map_.clear();
+  submaps_.clear();
+  loop_witness_.clear();
+  loop_undo_.reset();
   for (const MapFeature& feature : content.map) map_.add(feature);
   scale_source_ = static_cast<ScaleSource>(content.scale_source);
   scale_finder_.reset();
@@ -303,7 +314,12 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   awaits_loaded_map_ = true;
   map_number_ = maps_begun_++;
   is_pose_given_ = false;
-  lookForCamera("map loaded: looking for the camera in it");
+  const bool has_submaps = !content.frozen.empty();
+  if (has_submaps && submaps_.isEnabled()) submaps_.restore(content);
+  lookForCamera(has_submaps && !submaps_.isEnabled()
+                    ? "map loaded, without its submaps, as submaps/enabled is false: looking for "
+                      "the camera in it"
+                    : "map loaded: looking for the camera in it");
 }
 
 }  // namespace active_matching_slam

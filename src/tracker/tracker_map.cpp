@@ -26,9 +26,20 @@ constexpr std::ptrdiff_t kNeighbours = 5;
 
 void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedFrame* frame) {
   if (ids.empty()) return;
+  if (submaps_.isEnabled()) {
+    const std::vector<FeatureId> gone = submaps_.remove(ids, &filter_, map_);
+    map_.retire(gone);
+    frame->features_retired += static_cast<int>(gone.size());
+    return;
+  }
   filter_.removeFeatures(ids);
   map_.retire(ids);
   frame->features_retired += static_cast<int>(ids.size());
+}
+
+/// That the map may hold. What may be laid aside soon is not deleted now.
+int Tracker::Implementation::mostFeatures() const {
+  return options_.map.maximum_features + (submaps_.isEnabled() ? SubmapKeeper::kSlack : 0);
 }
 
 void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* frame) {
@@ -37,15 +48,15 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
   retire(map_.failing(options_.map), frame);
   retire(map_.drifting(), frame);
   frame->features_failed = frame->features_retired;
+  keepSubmaps(*frame);
   // The maximum may have been lowered.
-  retire(leastInformative(map_.size() - options_.map.maximum_features), frame);
+  retire(leastInformative(map_.size() - mostFeatures()), frame);
   if (poor_frames_ > 0) return;  // where the camera is unsure, nothing new is put on the map
   const std::vector<VisibleFeature> visible = visibleFeatures();
   const int wanted =
       options_.map.features_per_frame - static_cast<int>(map_.expectedMatches(visible));
   if (wanted <= 0) return;
-  const int excess =
-      map_.size() + std::min(wanted, kMaximumStartsPerFrame) - options_.map.maximum_features;
+  const int excess = map_.size() + std::min(wanted, kMaximumStartsPerFrame) - mostFeatures();
   if (excess > 0) retire(leastInformative(excess), frame);
   frame->features_started +=
       startFeatures(image, visible, std::min(wanted, kMaximumStartsPerFrame), frame);
@@ -53,6 +64,17 @@ void Tracker::Implementation::maintainMap(const cv::Mat& image, TrackedFrame* fr
 
 /// Features to make room in a full map.
 std::vector<FeatureId> Tracker::Implementation::leastInformative(int count) const {
+  if (submaps_.isEnabled()) {
+    if (count <= 0) return {};
+    std::vector<FeatureId> ids = options_.map.retire_by_information
+                                     ? map_.leastInformative(map_.size())
+                                     : map_.leastUseful(filter_, map_.size());
+    ids.erase(std::remove_if(ids.begin(), ids.end(),
+                             [this](FeatureId id) { return submaps_.isPinned(id); }),
+              ids.end());
+    if (static_cast<int>(ids.size()) > count) ids.resize(static_cast<std::size_t>(count));
+    return ids;
+  }
   return options_.map.retire_by_information ? map_.leastInformative(count)
                                             : map_.leastUseful(filter_, count);
 }
@@ -166,7 +188,7 @@ FeatureId Tracker::Implementation::addFeature(const Eigen::Vector2d& pixel,
 int Tracker::Implementation::startFeatures(const cv::Mat& image,
                                            const std::vector<VisibleFeature>& visible, int wanted,
                                            TrackedFrame* frame) {
-  wanted = std::min(wanted, options_.map.maximum_features - map_.size());
+  wanted = std::min(wanted, mostFeatures() - map_.size());
   if (wanted <= 0) return 0;
   std::vector<Eigen::Vector2d> occupied;
   for (const MapFeature& feature : map_.features()) {
@@ -179,6 +201,8 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
   }
   const auto& fixed = initialiser_.imageFixedPixels();
   occupied.insert(occupied.end(), fixed.begin(), fixed.end());
+  const std::vector<Eigen::Vector2d> frozen = frozenPixels();
+  occupied.insert(occupied.end(), frozen.begin(), frozen.end());
   const std::vector<DepthSample> known_depths = knownDepths(visible);
   const double distance_px =
       options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());

@@ -53,7 +53,7 @@ std::vector<VisibleFeature> Tracker::Implementation::visibleFeatures(
   const auto is_masked = [&](const VisibleFeature& feature) {
     const bool is_behind = !mask_.isSearched(feature.view.pixel);
     if (is_behind && behind_mask) behind_mask->push_back(feature.id);
-    return is_behind;
+    return is_behind || submaps_.isUnsearched(feature.id);
   };
   visible.erase(std::remove_if(visible.begin(), visible.end(), is_masked), visible.end());
   return visible;

@@ -116,7 +116,9 @@ void Tracker::Implementation::becomeMetric(double factor, double relative_sigma,
   initialiser_.end();  // its adjustment would leave the unit of length free
   frame->rescaled_by = factor;
   rescale(factor);
+  submaps_.openTrunk(&filter_);
   filter_.loosenScale(relative_sigma);
+  submaps_.closeTrunk(&filter_);
   scale_source_ = source;
   frame->reason =
       "the map is metric from here on: its scale is known by " + scaleSourceName(source);

@@ -94,8 +94,10 @@ void Tracker::Implementation::scaleByTarget(TrackedFrame* frame) {
     return;
   }
   scale_fault_.clear();
-  takeScale(*scale, &filter_);
+  submaps_.openTrunk(&filter_);  // the scale is one of all lengths
+  takeScale(*estimateScale(filter_, distances), &filter_);
   rescaleBesideFilter(scale->factor);
+  submaps_.closeTrunk(&filter_);
   target_.is_taken = initialiser_.isDone();
   if (scale_source_ != ScaleSource::kFree) return;
   const bool is_tag = options_.target.kind == TargetDescription::Kind::kTag;

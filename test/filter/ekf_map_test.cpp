@@ -261,6 +261,46 @@ TEST_F(EkfMap, RemovingKeepsTheRestOfTheCovariance) {
   EXPECT_EQ(filter.find(ids[0]), nullptr);
 }
 
+TEST_F(EkfMap, PointsThatWereTakenOutComeBackAsTheyWere) {
+  Ekf filter = exampleFilter(model_, 3, 8);
+  const Ekf before = filter;
+  std::vector<FeatureState> points;
+  std::vector<FeatureId> ids;
+  for (const FeatureState& feature : filter.features()) {
+    if (feature.kind != FeatureKind::kPoint || feature.id % 3 == 0) continue;
+    points.push_back(feature);
+    ids.push_back(feature.id);
+  }
+  ASSERT_GE(points.size(), 3u);
+  filter.removeFeatures(ids);
+  const auto rows = 3 * static_cast<Eigen::Index>(points.size());
+  Eigen::MatrixXd own(rows, rows), cross(rows, filter.stateSize());
+  const auto P = before.covariance();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto row = 3 * static_cast<Eigen::Index>(i);
+    for (std::size_t j = 0; j < points.size(); ++j)
+      own.block<3, 3>(row, 3 * static_cast<Eigen::Index>(j)) =
+          P.block<3, 3>(points[i].offset, points[j].offset);
+    cross.block(row, 0, 3, CameraError::kSize) =
+        P.block(points[i].offset, 0, 3, CameraError::kSize);
+    for (const FeatureState& other : filter.features())
+      cross.block(row, other.offset, 3, other.size()) =
+          P.block(points[i].offset, before.find(other.id)->offset, 3, other.size());
+  }
+  EXPECT_THROW(filter.insertFeatures(points, own, cross.leftCols(5)), std::invalid_argument);
+  std::vector<FeatureState> unknown = points;
+  unknown.back().id = filter.nextId();
+  EXPECT_THROW(filter.insertFeatures(unknown, own, cross), std::invalid_argument);
+  filter.insertFeatures(points, own, cross);
+  EXPECT_EQ(filter.covariance(), before.covariance());
+  for (std::size_t i = 0; i < before.features().size(); ++i) {
+    EXPECT_EQ(filter.features()[i].id, before.features()[i].id);
+    EXPECT_EQ(filter.features()[i].offset, before.features()[i].offset);
+    EXPECT_EQ(filter.features()[i].position(), before.features()[i].position());
+  }
+  EXPECT_THROW(filter.insertFeatures(points, own, cross), std::invalid_argument);
+}
+
 TEST_F(EkfMap, IdsAreNeverUsedAgain) {
   Ekf filter(exampleOptions());
   filter.reset(CameraState(), 1e-4 * Eigen::Matrix<double, 12, 12>::Identity());

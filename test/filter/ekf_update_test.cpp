@@ -81,6 +81,90 @@ TEST_F(EkfUpdate, RepeatedLinearisationFindsABetterMeanAfterALargeTurn) {
   }
 }
 
+TEST_F(EkfUpdate, AStartAtTheMeanIsAnUpdateThatMayGoOn) {
+  const Ekf prior = exampleFilter(model_, 2);
+  Random random(5);
+  const auto measurements = noisyMeasurements(prior, model_, 1.0, random);
+  Ekf started = prior, iterated = prior;
+  FilterOptions options = prior.options();
+  options.update_iterations = 8;
+  iterated.setOptions(options);
+  const Eigen::VectorXd nowhere = Eigen::VectorXd::Zero(prior.stateSize());
+  started.update(model_, measurements, {}, Corrected::kAll, nowhere);
+  iterated.update(model_, measurements);
+  EXPECT_LT((started.camera().position_world - iterated.camera().position_world).norm(), 1e-9);
+  EXPECT_LT(relativeDifference(started.covariance(), iterated.covariance()), 1e-7);
+}
+
+/// A wall that was mapped long ago, a camera that believes to be half a turn of the head and a
+/// metre from where it is, and what it maps meanwhile.
+TEST_F(EkfUpdate, FindsItsWayFromWhereTheCameraIsBelievedToBe) {
+  Random random(21);
+  Eigen::Matrix<double, 12, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(0.8), Eigen::Vector3d::Constant(0.5),
+      Eigen::Matrix<double, 6, 1>::Constant(0.1);
+  Ekf prior(exampleOptions());
+  prior.reset(CameraState(), sigma.cwiseAbs2().asDiagonal());
+  Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
+  moved.linear() = rotationFromVector(Eigen::Vector3d(0.3, -0.5, 0.4)).toRotationMatrix();
+  moved.translation() << 0.5, -0.4, 0.7;
+  std::vector<FeatureMeasurement> measurements;
+  std::vector<FeatureId> carried;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector2d pixel = random.pixel();
+    carried.push_back(prior.addInverseDepthFeature(model_, pixel, 0.4, 0.05));
+    measurements.push_back({carried.back(), pixel, 0.0});
+  }
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector2d pixel = random.pixel();
+    const Eigen::Vector3d point = moved * (random.uniform(2.0, 4.0) * *model_.unproject(pixel));
+    const FeatureId id = prior.addPointFeature(point, 1e-4 * Eigen::Matrix3d::Identity());
+    measurements.push_back({id, pixel, 0.0});
+  }
+  Eigen::Isometry3d believed = moved;  // as a resection would have it, a little off
+  believed.translation() += Eigen::Vector3d(0.02, 0.03, -0.02);
+  const Eigen::VectorXd start =
+      errorOfMotion(believed, prior.camera(), prior.features(), carried, prior.stateSize());
+  Ekf filter = prior;
+  const UpdateReport report = filter.update(model_, measurements, {}, Corrected::kAll, start);
+  EXPECT_TRUE(report.healthy);
+  EXPECT_EQ(report.used, static_cast<int>(measurements.size()));
+  EXPECT_LT((filter.camera().position_world - moved.translation()).norm(), 0.01);
+  EXPECT_LT(vectorFromRotation(filter.camera().q_world_camera *
+                               Eigen::Quaterniond(moved.linear()).conjugate())
+                .norm(),
+            0.003);
+  for (const FeatureMeasurement& m : measurements)
+    EXPECT_LT((projectIn(filter, model_, *filter.find(m.id))->pixel - m.pixel).norm(), 1.0);
+
+  Ekf single = prior;
+  single.update(model_, measurements);
+  EXPECT_GT((single.camera().position_world - moved.translation()).norm(), 0.1);
+}
+
+TEST_F(EkfUpdate, AMotionOfTheWorldCarriesWhatIsNamedAndNothingElse) {
+  const Ekf filter = exampleFilter(model_, 6);
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = rotationFromVector(Eigen::Vector3d(0.7, -0.4, 1.1)).toRotationMatrix();
+  motion.translation() << 3.0, -2.0, 1.0;
+  std::vector<FeatureId> carried;
+  for (const FeatureId id : idsOf(filter))
+    if (id % 2 == 0) carried.push_back(id);
+  CameraState camera = filter.camera();
+  std::vector<FeatureState> features = filter.features();
+  applyError(errorOfMotion(motion, camera, features, carried, filter.stateSize()), camera,
+             features);
+  EXPECT_TRUE(camera.poseWorldCamera().isApprox(motion * filter.camera().poseWorldCamera(), 1e-12));
+  EXPECT_TRUE(camera.velocity_world.isApprox(motion.linear() * filter.camera().velocity_world));
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const Eigen::Vector3d before = filter.features()[i].position();
+    const Eigen::Vector3d expected =
+        features[i].id % 2 == 0 && !features[i].anchored_at_origin ? motion * before : before;
+    if (features[i].anchored_at_origin) continue;  // its anchor can't move
+    EXPECT_TRUE(features[i].position().isApprox(expected, 1e-10)) << features[i].id;
+  }
+}
+
 TEST_F(EkfUpdate, SkipsWhatCanNotBeFusedAndLeavesTheRestUntouched) {
   Ekf filter = exampleFilter(model_, 4);
   Ekf expected = filter;

@@ -155,6 +155,22 @@ TEST(FeatureMap, KeepsFeaturesInOrderAndCountsTheRetired) {
   EXPECT_EQ(map.retiredTotal(), 1);
 }
 
+TEST(FeatureMap, WhatIsTakenOutGoesOnElsewhereAndIsNotCountedAsRetired) {
+  World world;
+  std::vector<FeatureId> ids;
+  for (int i = 0; i < 5; ++i) ids.push_back(world.add(Vector3d(0.1 * i, 0, 2)));
+  const auto taken = world.map.take({ids[3], ids[1], 99});
+  ASSERT_EQ(taken.size(), 2u);
+  EXPECT_EQ(taken[0].id, ids[1]);
+  EXPECT_EQ(taken[1].id, ids[3]);
+  EXPECT_FALSE(taken[0].patch.image.empty());
+  EXPECT_EQ(world.map.size(), 3);
+  EXPECT_EQ(world.map.find(ids[3]), nullptr);
+  EXPECT_EQ(world.map.retiredTotal(), 0);
+  for (const MapFeature& feature : taken) world.map.add(feature);
+  EXPECT_NE(world.map.find(ids[3]), nullptr);
+}
+
 TEST(FeatureMap, SeesTheSameInAnotherScale) {
   World world;
   world.add({0, 0, 2}, cameraBeside(0.8));

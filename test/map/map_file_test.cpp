@@ -245,8 +245,8 @@ TEST_F(MapFile, RefusesWhatIsDamagedOrTooNew) {
   bytes[bytes.size() / 2] ^= 1;
   expectRefused(bytes, "damaged");
   bytes = serializeMap(smallMap());
-  setNumber(&bytes, 8, 6, 4);
-  expectRefused(bytes, "version 6");
+  setNumber(&bytes, 8, 7, 4);
+  expectRefused(bytes, "version 7");
   bytes = serializeMap(smallMap());
   double infinity = std::numeric_limits<double>::infinity();
   std::memcpy(&bytes[bytes.size() - 8], &infinity, 8);
@@ -287,9 +287,20 @@ TEST_F(MapFile, RefusesASlopeThatIsNone) {
   expectSlopeRefused(slope, indefinite);
 }
 
+/// What version 5 would have written of a map without submaps.
+std::string version5Of(const MapFileContent& content) {
+  std::string bytes = serializeMap(content);
+  const auto n = static_cast<std::size_t>(content.covariance.rows());
+  // An empty trunk (number, bits, two counts), the next number, submaps, features laid aside.
+  const std::size_t empty = (4 + 3) * 8;
+  bytes.erase(bytes.size() - 8 * (n * (n + 1) / 2) - empty, empty);
+  setNumber(&bytes, 8, 5, 4);
+  return bytes;
+}
+
 /// What version 4 would have written of a map without a graph.
 std::string version4Of(const MapFileContent& content) {
-  std::string bytes = serializeMap(content);
+  std::string bytes = version5Of(content);
   const auto n = static_cast<std::size_t>(content.covariance.rows());
   const std::size_t counts = 2 * 8;  // of features and links in the graph
   bytes.erase(bytes.size() - 8 * (n * (n + 1) / 2) - counts, counts);
@@ -309,6 +320,96 @@ std::string version2Of(const MapFileContent& content) {
   }
   setNumber(&bytes, 8, 2, 4);
   return bytes;
+}
+
+/// With a trunk of one feature and a submap of two, which hangs on it and on one of the map.
+MapFileContent mapWithSubmaps() {
+  MapFileContent content = smallMap();
+  content.next_id = 9;
+  content.next_submap = 5;
+  const auto fill = [](StoredSubmap* submap) {
+    const auto rows = 3 * static_cast<Eigen::Index>(submap->ids.size());
+    const auto columns = 5 + 3 * static_cast<Eigen::Index>(submap->given_ids.size());
+    submap->mean = Eigen::VectorXd::LinSpaced(rows, 1.0, 2.0);
+    submap->given_mean = Eigen::VectorXd::LinSpaced(columns, -1.0, 1.0);
+    submap->K = submap->mean * submap->given_mean.transpose();
+    submap->Q = 0.01 * Eigen::MatrixXd::Identity(rows, rows);
+    submap->Q.topRightCorner(1, 1).setConstant(1.0 / 3000.0);
+  };
+  content.trunk.ids = {5};
+  content.trunk.given_ids = {1, 3};
+  fill(&content.trunk);
+  StoredSubmap submap;
+  submap.id = 3;
+  submap.lost_bits = 1.0 / 7.0;
+  submap.ids = {8, 6};
+  submap.given_ids = {1, 5};
+  fill(&submap);
+  content.submaps.push_back(submap);
+  for (const FeatureId id : {5, 6, 8}) {
+    content.frozen.push_back(content.map[0]);
+    content.frozen.back().id = id;
+    content.frozen.back().successes = static_cast<int>(id) - 1;
+  }
+  return content;
+}
+
+TEST_F(MapFile, KeepsWhatWasLaidAsideBitForBit) {
+  const MapFileContent written = mapWithSubmaps();
+  writeMapFile(path_, written);
+  const MapFileContent read = readMapFile(path_);
+  EXPECT_EQ(read.next_submap, 5);
+  EXPECT_EQ(read.trunk.ids, written.trunk.ids);
+  EXPECT_EQ(read.trunk.given_ids, written.trunk.given_ids);
+  EXPECT_EQ(read.trunk.K, written.trunk.K);
+  ASSERT_EQ(read.submaps.size(), 1u);
+  EXPECT_EQ(read.submaps[0].id, 3);
+  EXPECT_EQ(read.submaps[0].lost_bits, written.submaps[0].lost_bits);
+  EXPECT_EQ(read.submaps[0].ids, written.submaps[0].ids);
+  EXPECT_EQ(read.submaps[0].given_ids, written.submaps[0].given_ids);
+  EXPECT_EQ(read.submaps[0].mean, written.submaps[0].mean);
+  EXPECT_EQ(read.submaps[0].given_mean, written.submaps[0].given_mean);
+  EXPECT_EQ(read.submaps[0].K, written.submaps[0].K);
+  EXPECT_EQ(read.submaps[0].Q, written.submaps[0].Q);
+  ASSERT_EQ(read.frozen.size(), 3u);
+  EXPECT_EQ(read.frozen[2].id, 8);
+  EXPECT_EQ(read.frozen[2].successes, 7);
+  EXPECT_EQ(serializeMap(read), serializeMap(written));
+}
+
+TEST_F(MapFile, RefusesSubmapsThatHangOnNothing) {
+  const auto expectFault = [](const MapFileContent& content, const std::string& fault) {
+    try {
+      serializeMap(content);
+      FAIL() << "accepted, not refused for: " << fault;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find(fault), std::string::npos) << error.what();
+    }
+  };
+  MapFileContent content = mapWithSubmaps();
+  content.submaps[0].given_ids[1] = 7;
+  expectFault(content, "submap 3 hangs on feature 7");
+  content = mapWithSubmaps();
+  content.submaps[0].ids[0] = 5;
+  expectFault(content, "submap 3 holds feature 5");
+  content = mapWithSubmaps();
+  content.trunk.Q(1, 1) = -1.0;
+  expectFault(content, "the trunk has a negative variance");
+  content = mapWithSubmaps();
+  content.submaps[0].K.resize(6, 2);
+  expectFault(content, "matrices of another size");
+  content = mapWithSubmaps();
+  content.frozen.pop_back();
+  expectFault(content, "different in number");
+  content = mapWithSubmaps();
+  content.next_submap = 3;
+  expectFault(content, "out of order");
+}
+
+TEST_F(MapFile, AMapOfVersion5IsReadAsItIs) {
+  std::string old = version5Of(smallMap());
+  seal(&old);
+  EXPECT_EQ(serializeMap(parseMap(old)), serializeMap(smallMap()));
 }
 
 TEST_F(MapFile, MapsOfVersions3And4AreReadAsTheyAre) {
@@ -363,7 +464,7 @@ TEST_F(MapFile, AMapOfVersion1IsReadAndItsCalibrationIsInDoubtAnew) {
 // Deterministic fuzz: files with bytes changed, numbers replaced, parts removed or doubled, with a
 // right checksum. Each is either refused or a state that a filter can take over.
 TEST_F(MapFile, MutatedFilesAreRefusedOrSound) {
-  const std::string original = serializeMap(smallMap());
+  const std::string original = serializeMap(mapWithSubmaps());
   std::mt19937_64 random(1);
   constexpr std::uint64_t kNumbers[] = {0,
                                         1,

@@ -102,6 +102,24 @@ TEST(Relocaliser, FindsTheCameraAlongTheMotionAndNeverAWrongPlace) {
   }
 }
 
+TEST(Relocaliser, FindsTheCameraByLandmarksWhereverTheyAreKept) {
+  Simulator simulator(sequence("room"));
+  const Relocaliser relocaliser({}, {}, {});
+  KnownMap known;
+  addFeatures(simulator, *simulator.next(), &known);
+  const auto frame = simulator.next();
+  const auto expected = relocaliser.find(simulator.camera(), frame->image, known.filter, known.map);
+  ASSERT_TRUE(expected);
+  std::vector<Landmark> landmarks;
+  for (const MapFeature& feature : known.map.features())
+    landmarks.push_back({&feature, *known.filter.find(feature.id)});
+  const auto found = relocaliser.find(simulator.camera(), frame->image, landmarks);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->T_world_camera.matrix(), expected->T_world_camera.matrix());
+  landmarks.resize(5);
+  EXPECT_FALSE(relocaliser.find(simulator.camera(), frame->image, landmarks));
+}
+
 TEST(Relocaliser, SeesThroughTheLensAsItIsKnownByNow) {
   Simulator simulator(sequence("room"));
   CameraCalibration faulty = simulator.camera().calibration();

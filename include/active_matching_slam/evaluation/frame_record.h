@@ -35,6 +35,9 @@ struct FrameRecord {
   int features_started = 0, features_retired = 0, features_converted = 0, features_failed = 0;
   int resets = 0, times_lost = 0, late_images = 0;
   int map = 0, jumps = 0;
+  int submaps = 0, frozen_features = 0, trunk_features = 0;  ///< FrozenMap
+  double lost_bits = 0.0;
+  int submaps_frozen = 0, submaps_found = 0, loops = 0, map_epoch = 0;
   double quality = 1.0;
   std::string quality_reason;
   Accelerations accelerations;

@@ -67,6 +67,9 @@ struct RunSummary {
   int cut_short_frames = 0, ambiguous_frames = 0;
   int map_features_end = 0, map_features_most = 0;
   std::int64_t started = 0, retired = 0, converted = 0;
+  int submaps_end = 0, frozen_features_end = 0, trunk_features_most = 0;  ///< FrozenMap
+  double lost_bits_end = 0.0;
+  int submaps_frozen = 0, submaps_found = 0, loops = 0;
   std::vector<DurationSummary> durations;  ///< every stage, then "total"
 };
 

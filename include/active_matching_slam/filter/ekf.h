@@ -166,6 +166,14 @@ class Ekf {
   FeatureId addPointFeature(const Eigen::Vector3d& position_world,
                             const Eigen::Matrix3d& covariance);
   void removeFeatures(const std::vector<FeatureId>& ids);
+  /// Takes back features that were removed, as points: `features` by ascending id (their offsets
+  /// are computed anew), their own covariance, 3 F x 3 F, and that with the state, 3 F x
+  /// stateSize(), both in this order. Throws std::invalid_argument, and changes nothing, when these
+  /// do not fit together, or for an id that is in the state or was never given.
+  void insertFeatures(const std::vector<FeatureState>& features, const Eigen::MatrixXd& own,
+                      const Eigen::MatrixXd& cross);
+  /// Adds `added`, positive semi-definite and of the state's size, to the covariance.
+  void inflate(const Eigen::MatrixXd& added);
   /// Turns features whose depth is well known into points by the linearity index; returns which.
   std::vector<FeatureId> convertToPoints();
 
@@ -178,9 +186,14 @@ class Ekf {
   /// over time (variance_inflation), map, calibration and what was known of the camera before learn
   /// by the inflated R; once these are known, the impulse of the last predict(), which is
   /// independent of the past, by R.
+  /// `start`: where the state is so far off that a linearisation there would be of no use, an error
+  /// state (see applyError()) that leads to where it is believed to be. The first linearisation is
+  /// made there, and others follow until they converge; the result counts from the present mean as
+  /// ever. Empty: none.
   UpdateReport update(const CameraModel& camera,
                       const std::vector<FeatureMeasurement>& measurements,
-                      const NoisePrior& noise = {}, Corrected corrected = Corrected::kAll);
+                      const NoisePrior& noise = {}, Corrected corrected = Corrected::kAll,
+                      const Eigen::VectorXd& start = {});
 
   /// Takes the present map's scale as the unit: fuses, without moving the mean, that the mean
   /// logarithm of the features' distances is known to `relative_sigma`. Where scale is free this

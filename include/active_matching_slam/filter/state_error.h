@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "active_matching_slam/filter/camera_state.h"
@@ -16,6 +17,13 @@ namespace active_matching_slam {
 /// depth, readout, lens and a gyroscope's bias add.
 void applyError(const Eigen::Ref<const Eigen::VectorXd>& delta, CameraState& camera,
                 std::vector<FeatureState>& features);
+
+/// The error state that moves the camera, its velocity and the `carried` features (ascending ids)
+/// by `T_new_old`, a motion of the world, however large, and leaves the other features where they
+/// are.
+Eigen::VectorXd errorOfMotion(const Eigen::Isometry3d& T_new_old, const CameraState& camera,
+                              const std::vector<FeatureState>& features,
+                              const std::vector<FeatureId>& carried, int state_size);
 
 /// Gauge freedoms that a correction must leave as they were: rotation of the world (3) and scale
 /// (1). Derivation: of the seven of a similarity, translation needs no care: its generator is the

@@ -23,4 +23,8 @@ namespace active_matching_slam {
 SubmapPartition cutIntoSubmaps(const MutualInformationGraph& graph,
                                const SubmapHierarchy& hierarchy, int submaps);
 
+/// A cut as a level, with what the naive partition into as many parts preserves of the graph.
+/// Throws as levelOfLabels() does.
+SubmapLevel levelOf(SubmapPartition cut, const MutualInformationGraph& graph);
+
 }  // namespace active_matching_slam

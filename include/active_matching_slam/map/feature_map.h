@@ -64,6 +64,8 @@ class FeatureMap {
   void add(MapFeature feature);
   /// Forgets features that the filter has removed.
   void retire(const std::vector<FeatureId>& ids);
+  /// Takes out features that go on elsewhere, by ascending id; they are not counted as retired.
+  std::vector<MapFeature> take(const std::vector<FeatureId>& ids);
   /// Multiplies all lengths by `factor` > 0, as the filter has.
   void rescale(double factor);
   /// Puts the camera of each feature's first view at `moved(first_frame, T_world_camera)`.

@@ -22,7 +22,13 @@ struct Relocalisation {
   double rms_px = 0.0;                      ///< of the inliers, both axes together
 };
 
-/// Finds the camera in the map from one image, without any guess where it is: descriptors (ORB,
+/// A feature whose place is known.
+struct Landmark {
+  const MapFeature* feature;
+  FeatureState state;
+};
+
+/// Finds the camera in a map from one image, without any guess where it is: descriptors (ORB,
 /// Rublee et al. 2011) of the features at first sight against corners of the image at several
 /// scales, a pose by RANSAC, and then the proof: most features that the pose says are visible must
 /// match there by their warped templates. Deterministic. The map is used as if it were certain.
@@ -38,6 +44,11 @@ class Relocaliser {
                                      const Ekf& filter, const FeatureMap& map,
                                      const ImageMask& mask = {}) const;
 
+  /// The same in a map of these landmarks, ascending id, wherever they are kept.
+  std::optional<Relocalisation> find(const CameraModel& camera, const cv::Mat& image,
+                                     const std::vector<Landmark>& landmarks,
+                                     const ImageMask& mask = {}) const;
+
   /// The same by `matches` in the place of descriptors. Some of them may be wrong.
   std::optional<Relocalisation> findByMatches(const CameraModel& camera, const cv::Mat& image,
                                               const Ekf& filter, const FeatureMap& map,
@@ -48,10 +59,6 @@ class Relocaliser {
   bool canFind(const Ekf& filter, const FeatureMap& map) const;
 
  private:
-  struct Landmark {
-    const MapFeature* feature;
-    const FeatureState* state;
-  };
   struct Sighting {
     const Landmark* landmark;
     Eigen::Vector2d pixel;

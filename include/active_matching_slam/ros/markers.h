@@ -36,7 +36,8 @@ struct TrajectoryPoint {
 // Everything below lives in the frame of the header. Colours of features: green matched, orange
 // rejected, red missed, blue not visible or not searched, white known.
 
-/// Points, 3-sigma ellipsoids; inverse-depth features as the 3-sigma interval of their ray.
+/// Points, 3-sigma ellipsoids; inverse-depth features as the 3-sigma interval of their ray. What
+/// was laid aside in the colours of its submaps, and the separators by which these hang on the map.
 visualization_msgs::MarkerArray featureMarkers(const TrackedFrame& frame,
                                                const std_msgs::Header& header);
 /// linksToShow(), width and colour by bits; the tree in gold on top.

@@ -75,6 +75,24 @@ struct TrackedFeature {
   cv::Mat template_image;  ///< 8-bit source patch at first sight
 };
 
+/// A feature that has left the active map and is kept.
+struct FrozenFeature {
+  FeatureId id = -1;
+  int submap = -1;            ///< the leaf that holds it; -1: the trunk
+  bool is_separator = false;  ///< of a leaf
+  Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
+};
+
+/// What has left the active map and is kept, as submaps (SubmapTree).
+struct FrozenMap {
+  std::vector<FrozenFeature> features;       ///< ascending id
+  std::vector<FeatureId> active_separators;  ///< of leaves, in the active map; ascending
+  int submaps = 0;                           ///< leaves
+  int trunk_features = 0;
+  double lost_bits = 0.0;     ///< by the leaves' links to the rest that were cut, their sum
+  int frozen = 0, found = 0;  ///< leaves so far, and how often one became active again
+};
+
 /// Time spent in each stage of a frame [ms].
 struct FrameTimings {
   double predict = 0, measure = 0, match = 0, update = 0, map = 0, structure = 0, total = 0;
@@ -132,6 +150,11 @@ struct TrackedFrame {
   /// Whether the poses can be trusted, 0 to 1, and the likely cause where they can't.
   double quality = 1.0;
   std::string quality_reason;
+  std::shared_ptr<const FrozenMap> frozen;  ///< null unless submaps/enabled
+  int loops = 0;      ///< closed since construction: places found again though the map had drifted
+  int map_epoch = 0;  ///< so often since construction a loop moved map and camera
+  /// In such a frame: the camera after the correction, times the inverse of the one before.
+  Eigen::Isometry3d map_jump = Eigen::Isometry3d::Identity();
   int jumps = 0;        ///< so often since construction the pose did not go on from the one before
   int late_images = 0;  ///< left out since construction: taken before one that came earlier
 

@@ -15,6 +15,7 @@
 #include "active_matching_slam/matching/match_options.h"
 #include "active_matching_slam/math/option_field.h"
 #include "active_matching_slam/tracker/ground_plane.h"
+#include "active_matching_slam/submaps/submap_filter_options.h"
 #include "active_matching_slam/tracker/match_cascade_options.h"
 #include "active_matching_slam/tracker/motion_options.h"
 
@@ -51,6 +52,7 @@ struct TrackerOptions {
   MatchOptions matching = liveMatchOptions();
   MatchCascadeOptions cascade;
   SubmapOptions submaps;
+  SubmapFilterOptions submap_filter;
   InitialiserOptions initialisation;
   RelocaliserOptions relocaliser;
   MotionOptions motion;
@@ -132,6 +134,7 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
   visitOptions(o.map, visit);
   visitOptions(o.matching, visit);
   visitOptions(o.cascade, visit);
+  visitOptions(o.submap_filter, visit);
   visitOptions(o.submaps, visit);
   visitOptions(o.initialisation, visit);
   visitOptions(o.relocaliser, visit);
