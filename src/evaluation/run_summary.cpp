@@ -55,12 +55,14 @@ std::vector<PosePair> posesOf(const std::vector<std::pair<int, int>>& indices,
 }
 
 /// `pairs` in the world of the map, in which the filter's covariance is stated. A map that was
-/// begun metric has the truth's world; one that became so by odometry has that of the first camera.
+/// begun metric has the truth's world; one that became so on the way has that of the first camera.
 /// One of free scale has its gauge fixed at the first camera, known without error, and the
 /// likeliest scale.
 std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, ScaleSource source,
                                  const std::vector<Eigen::Matrix<double, 6, 6>>& covariances) {
-  const bool has_own_world = source == ScaleSource::kFree || source == ScaleSource::kOdometry;
+  const bool became_metric =
+      source == ScaleSource::kOdometry || source == ScaleSource::kCameraHeight;
+  const bool has_own_world = source == ScaleSource::kFree || became_metric;
   if (!has_own_world || pairs.empty()) return pairs;
   const Eigen::Isometry3d T_map_truth =
       pairs.front().T_world_camera_estimate * pairs.front().T_world_camera_truth.inverse();
@@ -73,9 +75,8 @@ std::vector<PosePair> inMapWorld(std::vector<PosePair> pairs, ScaleSource source
     estimates.push_back(pair.T_world_camera_estimate);
     truth.push_back(pair.T_world_camera_truth);
   }
-  const double scale = source == ScaleSource::kOdometry
-                           ? 1.0
-                           : likeliestScale(estimates, truth, covariances).value_or(1.0);
+  const double scale =
+      became_metric ? 1.0 : likeliestScale(estimates, truth, covariances).value_or(1.0);
   for (PosePair& pair : pairs) pair.T_world_camera_truth.translation() *= scale;
   return pairs;
 }

@@ -1,6 +1,8 @@
 // Figures 7.7 and 7.8, Table 7.1: the cost of AM, FAM, CLAM and JCBB with 100 features, and of the
 // package's own settings up to 400.
 
+#include <cmath>
+
 #include "test_bed_charts.h"
 
 namespace active_matching_slam {
@@ -92,11 +94,18 @@ ExperimentResult runScalableMatching(Workbench& bench) {
     }
   for (const std::string matcher : {"active_live", "chow_liu_live"}) {
     std::string here;
+    std::vector<Eigen::Vector2d> times;  // features, ms
     for (const TestBedCell& cell : cells)
       if (cell.matcher == matcher && cell.sequence == bench.mainSequence() &&
-          cell.rate_hz == 30.0 && cell.features >= most && cell.summary.frames > 0)
+          cell.rate_hz == 30.0 && cell.features >= most && cell.summary.frames > 0) {
         here += text("%s%.0f: %.2f", here.empty() ? "" : "; ", cell.summary.candidates,
                      cell.summary.total_ms);
+        times.emplace_back(cell.summary.candidates, cell.summary.total_ms);
+      }
+    if (times.size() > 1)
+      here +=
+          text("; grows with the power %.2f", std::log(times.back().y() / times.front().y()) /
+                                                  std::log(times.back().x() / times.front().x()));
     result.findings.push_back({matcher + " with the package's settings, by features [ms]",
                                "AM 25.2 s, CLAM 122 ms (100 features)", here,
                                Finding::Verdict::kNoVerdict, true});

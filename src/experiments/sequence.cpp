@@ -30,6 +30,7 @@ constexpr Definition kDefinitions[] = {
     {"walkway_straight", "walkway", "forward", 1024, 768, 8.0, 0.8, 0.9},
     {"two_depths", "two_depths", "circle", 640, 480, 12.0, 1.0, 1.0},
     {"wall", "wall", "sideways", 640, 480, 12.0, 1.0, 1.0},
+    {"planks", "planks", "forward", 640, 480, 8.0, 1.0, 1.0},
     {"corridor", "corridor", "forward", 640, 480, 12.0, 1.0, 1.0},
     {"corridor_end", "corridor_end", "sweep", 640, 480, 15.0, 1.0, 1.0},
     {"corridor_loop", "corridor_loop", "loop", 640, 480, 40.0, 1.0, 1.0},

@@ -19,8 +19,8 @@ struct Sequence {
   CameraModel camera;
   std::vector<cv::Mat> images{};
   std::vector<double> stamps_s{};
-  Trajectory truth{};              ///< empty: unknown
-  std::vector<Surface> surfaces{}; ///< what is seen, without textures; empty for a recording
+  Trajectory truth{};               ///< empty: unknown
+  std::vector<Surface> surfaces{};  ///< what is seen, without textures; empty for a recording
   /// Unknown acceleration as fits the motion: the thesis tunes it by the sequence, too.
   double sigma_acceleration = 6.0, sigma_angular_acceleration = 10.0;
 
@@ -28,7 +28,8 @@ struct Sequence {
 };
 
 /// Names: office_slow, office_fast, walkway_slow, walkway_fast, walkway_straight, two_depths, wall,
-/// corridor, corridor_end, corridor_loop (simulated) and desk, checkerboard (recorded). `quick`: half the size, and shorter.
+/// planks, corridor, corridor_end, corridor_loop (simulated) and desk, checkerboard (recorded).
+/// `quick`: half the size, and shorter.
 bool isRecordedName(const std::string& name);
 Sequence loadSequence(const std::string& name, const std::string& data_folder, bool quick);
 

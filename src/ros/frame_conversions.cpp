@@ -64,6 +64,7 @@ ams_msgs::TrackingState toTrackingStateMsg(const TrackedFrame& frame,
   message.scale_source = static_cast<std::uint8_t>(frame.scale_source);
   message.scale_source_name = scaleSourceName(frame.scale_source);
   message.scale_sigma = static_cast<float>(finiteOrZero(frame.scale_sigma));
+  message.scale_fault = frame.scale_fault;
   message.motion_source = frame.motion_source;
   message.motion_fault = frame.motion_fault;
   message.resets = frame.resets;

@@ -83,8 +83,11 @@ std_msgs::Header FramePublisher::worldHeader(const ros::Time& stamp) const {
   return header;
 }
 
-void FramePublisher::publishState(const TrackedFrame& frame, const ros::Time& stamp) {
-  state_.publish(toTrackingStateMsg(frame, worldHeader(stamp)));
+void FramePublisher::publishState(const TrackedFrame& frame, const ros::Time& stamp,
+                                  const std::string& motion_fault) {
+  ams_msgs::TrackingState message = toTrackingStateMsg(frame, worldHeader(stamp));
+  if (!motion_fault.empty()) message.motion_fault = motion_fault;
+  state_.publish(message);
 }
 
 void FramePublisher::publish(const TrackedFrame& frame, const FrameContext& context,

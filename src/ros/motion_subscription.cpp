@@ -49,25 +49,26 @@ void MotionSubscription::received() {
 void MotionSubscription::onOdometry(const nav_msgs::OdometryConstPtr& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   odometry_.push_back(message);
-  if (odometry_.size() > kMotionQueueSize) odometry_.erase(odometry_.begin());
+  if (odometry_.size() > kMotionQueueSize) odometry_.pop_front();
   received();
 }
 
 void MotionSubscription::onImu(const sensor_msgs::ImuConstPtr& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   imu_.push_back(message);
-  if (imu_.size() > kMotionQueueSize) imu_.erase(imu_.begin());
+  if (imu_.size() > kMotionQueueSize) imu_.pop_front();
   received();
 }
 
 void MotionSubscription::takeIn() {
-  std::vector<nav_msgs::OdometryConstPtr> odometry;
-  std::vector<sensor_msgs::ImuConstPtr> imu;
+  std::deque<nav_msgs::OdometryConstPtr> odometry;
+  std::deque<sensor_msgs::ImuConstPtr> imu;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     odometry.swap(odometry_);
     imu.swap(imu_);
   }
+  has_come_ |= !odometry.empty() || !imu.empty();
   const auto add = [&](const std_msgs::Header& header, const std::string& frame, auto&& sampleOf) {
     base_frame_ = withoutLeadingSlash(frame);
     std::string wrong;
@@ -79,7 +80,6 @@ void MotionSubscription::takeIn() {
     }
     if (wrong.empty()) return;
     fault_ = topic_ + ": a message is at fault: " + wrong;
-    sample_warning_.say("sample", fault_);
   };
   for (const auto& message : odometry)
     add(message->header, message->child_frame_id, [&] { return fromOdometryMsg(*message); });
@@ -112,6 +112,7 @@ void MotionSubscription::findCamera(const std::string& camera_frame) {
 void MotionSubscription::collect(const ros::Time& stamp, const std::string& camera_frame) {
   if (!history_) return;
   fault_.clear();
+  has_come_ = false;
   takeIn();
   const ros::WallTime begin = ros::WallTime::now();
   const double timeout_s = options_.odometry_timeout_s;

@@ -37,6 +37,7 @@ void NodeDiagnostics::record(const TrackedFrame& frame, double latency_s, double
   reason_ = frame.reason;
   scale_source_ = frame.scale_source;
   scale_sigma_ = frame.scale_sigma;
+  scale_fault_ = frame.scale_fault;
   features_ = frame.features.size();
   candidates_ = frame.matching.statistics.candidates;
   matched_ = frame.matching.statistics.matched;
@@ -101,6 +102,8 @@ void NodeDiagnostics::reportTracking(Status& status) {
                        "tracking, but not to be trusted: " + quality_reason_);
       else if (!motion_fault_.empty())
         status.summary(DiagnosticStatus::WARN, motion_fault_);
+      else if (!scale_fault_.empty())
+        status.summary(DiagnosticStatus::WARN, scale_fault_);
       else if (nis_ratio > 3.0)
         status.summary(DiagnosticStatus::WARN, "tracking, but matches disagree with the filter");
       else

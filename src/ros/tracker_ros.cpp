@@ -68,6 +68,7 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
   advertiseServices();
   const std::string scale =
       settings_.tracker.motion.hasOdometry() ? "scale comes from " + motion_->topic()
+      : settings_.tracker.ground.isKnown()   ? "scale comes from camera_height_m"
       : settings_.node.known_target.empty()
           ? "scale is free: lengths are in map units until ~set_scale, or start from a known_target"
           : "scale comes from " + settings_.node.known_target;
@@ -77,6 +78,11 @@ TrackerRos::TrackerRos(const ros::NodeHandle& private_node)
                                                 ? " (rectified: its P, no distortion)"
                                                 : "")
                                         << "; " << scale);
+  if (!settings_.tracker.mapping &&
+      (settings_.tracker.ground.isKnown() || !settings_.node.known_target.empty()))
+    ROS_WARN(
+        "mapping is false: lengths are those of the loaded map, known_target and "
+        "camera_height_m are not used");
 }
 
 // A nodelet's callbacks run in other threads. Each source of them ends before what it asks.
@@ -123,8 +129,8 @@ void TrackerRos::track(const CameraImage& image) {
   }
   last_frame_ = frame;
   noticeChanges(*frame, image.header().stamp);
-  noticeMotion(*frame);
-  publisher_.publishState(*frame, image.header().stamp);
+  noticeScale(*frame);
+  publisher_.publishState(*frame, image.header().stamp, noticeMotion(*frame));
   if (!session_.fault().empty()) return;
   publish(*frame, image);
   diagnostics_.record(*frame, (ros::Time::now() - image.header().stamp).toSec(),
@@ -178,28 +184,37 @@ void TrackerRos::noticeChanges(const TrackedFrame& frame, const ros::Time& stamp
     ROS_WARN_STREAM("State: " << trackingStateName(state_) << because);
 }
 
-/// Says once that odometry, or IMU, is missing or wrong, and once that it is back.
-void TrackerRos::noticeMotion(const TrackedFrame& frame) {
-  if (!motion_->isOn()) return;
+/// Says once each what is wrong with odometry, or IMU, and that it is back. Returns what is wrong.
+std::string TrackerRos::noticeMotion(const TrackedFrame& frame) {
+  if (!motion_->isOn()) return {};
   const bool is_told = !frame.motion_source.empty();
   std::string fault = motion_->fault();
   if (fault.empty() && !frame.motion_fault.empty())
     fault = motion_->topic() + ": " + frame.motion_fault;
   diagnostics_.recordMotion(motion_->topic(), fault, is_told);
-  if (frame.rescaled_by != 1.0)
-    ROS_INFO_STREAM(motion_->topic() << ": the map is metric from here on, its scale known to "
-                                     << 100.0 * frame.scale_sigma << " %");
-  if (!is_told && !fault.empty()) {
-    if (is_motion_told_) ROS_WARN_STREAM(fault << "; constant velocity is assumed until it comes");
-    is_motion_told_ = false;
-  } else if (is_told) {
-    if (!is_motion_told_) ROS_INFO_STREAM(motion_->topic() << ": is used again");
-    is_motion_told_ = true;
-    if (!fault.empty()) slip_warning_.say("slip", fault);
+  if (is_told && !is_motion_told_) {
+    ROS_INFO_STREAM(motion_->topic() << ": is used again");
+    motion_warning_.forget();
   }
+  if (is_told || !fault.empty()) is_motion_told_ = is_told;
+  // What has stopped is at fault in several ways one after the other.
+  if (!fault.empty() && (motion_->hasCome() || !motion_warning_.hasSaid()))
+    motion_warning_.say(is_told ? fault : fault + "; constant velocity is assumed until it comes");
+  return fault;
+}
+
+/// What lengths are, when that changes, and once what was refused as their source.
+void TrackerRos::noticeScale(const TrackedFrame& frame) {
+  if (frame.rescaled_by != 1.0)
+    ROS_INFO_STREAM("The map is metric from here on, by " << scaleSourceName(frame.scale_source)
+                                                          << "; its scale is known to "
+                                                          << 100.0 * frame.scale_sigma << " %");
+  if (!frame.scale_fault.empty()) scale_warning_.say(frame.scale_fault);
 }
 
 void TrackerRos::forgetPast(bool time_jumped) {
+  motion_warning_.forget();
+  scale_warning_.forget();
   trajectory_.clear();
   publisher_.restart();
   broadcaster_.reset(time_jumped);

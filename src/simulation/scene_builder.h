@@ -107,6 +107,7 @@ Scene makeCorridorEnd(std::uint64_t seed);
 Scene makeCorridorLoop(std::uint64_t seed);
 Scene makeRooms(std::uint64_t seed);
 Scene makeWall(std::uint64_t seed);
+Scene makePlanks(std::uint64_t seed);
 Scene makeWalkway(std::uint64_t seed);
 
 }  // namespace active_matching_slam

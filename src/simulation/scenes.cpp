@@ -17,6 +17,7 @@ const std::vector<NamedChoice>& sceneChoices() {
       {"corridor_loop", "a corridor round a block, for the motion loop"},
       {"rooms", "four rooms alike in a ring of doors, for the motion loop"},
       {"wall", "one long wall, for moving sideways"},
+      {"planks", "a corridor of planks: edges along the way, hardly a corner"},
   };
   return choices;
 }
@@ -33,6 +34,7 @@ Scene createScene(const std::string& name, std::uint64_t seed) {
   if (name == "corridor_end") return makeCorridorEnd(seed);
   if (name == "corridor_loop") return makeCorridorLoop(seed);
   if (name == "rooms") return makeRooms(seed);
+  if (name == "planks") return makePlanks(seed);
   return makeWall(seed);
 }
 

@@ -35,6 +35,26 @@ Scene makeCorridor(std::uint64_t seed) {
   return b.finish();
 }
 
+Scene makePlanks(std::uint64_t seed) {
+  SceneBuilder b("planks", seed);
+  constexpr double kLength = 24.0;
+  b.scene().ambient = 0.7;
+  b.scene().light_grid_m = 0.2;
+  b.density(160);
+  const auto boards = [](double level, double plank_m) {
+    return [level, plank_m](const Canvas& c) { return paintWood(c, level, plank_m); };
+  };
+  b.room({-1.2, -1.0, 0.0}, {1.2, kLength, 2.6}, boards(0.45, 0.2), plaster(0.8),
+         {boards(0.6, 0.15), boards(0.6, 0.15), boards(0.5, 0.3), boards(0.55, 0.1)});
+  for (int i = 0; i < 7; ++i) {
+    const double y = 1.4 + 3.1 * i;
+    b.level({0, y, 2.595}, 0.0, 0.3, 1.2, plain(0.95), false, 1.0);
+    b.lamp({0, y, 2.55}, 0.6, 1.1);
+  }
+  b.start({0.0, 0.0, 1.5}, 0.5 * M_PI, 0.05, {-0.5, -0.3, -0.4}, {0.5, 0.3, 16.0}, 1.0);
+  return b.finish();
+}
+
 Scene makeCorridorEnd(std::uint64_t seed) {
   SceneBuilder b("corridor_end", seed);
   constexpr double kEnd = 3.4, kHalfWidth = 1.2;

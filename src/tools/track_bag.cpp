@@ -170,7 +170,7 @@ class AnnotatedVideo {
   cv::VideoWriter writer_;
 };
 
-void printSummary(const RunSummary& s, const std::string& output) {
+void printSummary(const RunSummary& s, const std::string& scale_fault, const std::string& output) {
   const auto print = [](const std::string& name, const std::optional<double>& value, double factor,
                         const char* unit) {
     if (value) std::printf(", %s %.1f %s", name.c_str(), factor * *value, unit);
@@ -197,8 +197,10 @@ void printSummary(const RunSummary& s, const std::string& output) {
     if (s.frames_without_motion > 0)
       std::printf(", missing in %d: %s", s.frames_without_motion, s.motion_fault.c_str());
   }
-  if (s.scale_source == ScaleSource::kOdometry)
-    std::printf("\nscale by odometry, known to %.2f %%", 100.0 * s.scale_sigma);
+  if (s.scale_sigma > 0.0)
+    std::printf("\nscale by %s, known to %.2f %%", scaleSourceName(s.scale_source).c_str(),
+                100.0 * s.scale_sigma);
+  if (!scale_fault.empty()) std::printf("\n%s", scale_fault.c_str());
   std::printf("\nwritten to %s\n", output.c_str());
 }
 
@@ -254,6 +256,7 @@ void run(const Settings& settings) {
     video = std::make_unique<AnnotatedVideo>(settings.output + "/annotated.avi",
                                              drawingOf(settings.draw));
   bool has_map = false;
+  std::string scale_fault;
   std::unique_ptr<TrackedBagWriter> tracked;
   if (settings.output_bag)
     tracked = std::make_unique<TrackedBagWriter>(settings.output + "/tracked.bag");
@@ -265,6 +268,7 @@ void run(const Settings& settings) {
     runSequence(&images, &tracker, settings.run, [&](const TrackedFrame& frame) {
       report.add(frame);
       has_map = !frame.features.empty();
+      scale_fault = frame.scale_fault;
       if (video) video->add(frame);
       if (tracked) tracked->add(frame);
       const MatchStatistics& matching = frame.matching.statistics;
@@ -276,7 +280,7 @@ void run(const Settings& settings) {
   report.write(settings.output);
   if (has_map && options.mapping) tracker.saveMap(settings.output + "/final.map");
   const RunSummary summary = report.summary();
-  printSummary(summary, settings.output);
+  printSummary(summary, scale_fault, settings.output);
   if (summary.frames_tracked == 0)
     throw std::runtime_error("no frame was tracked" + (summary.last_reason.empty()
                                                            ? std::string()

@@ -121,9 +121,10 @@ Eigen::Vector3d interpolated(const std::deque<GyroSample>& samples, double stamp
   return (1.0 - share) * a.angular_velocity + share * b.angular_velocity;
 }
 
-bool isCovariance(const Matrix6& C) {
-  return C.allFinite() && C.diagonal().minCoeff() >= 0.0 && C.diagonal().maxCoeff() > 0.0;
-}
+/// Or left at zero, by which is not stated what it is.
+bool isStated(const Matrix6& C) { return C.allFinite() && C.diagonal().minCoeff() >= 0.0; }
+
+bool isCovariance(const Matrix6& C) { return isStated(C) && C.diagonal().maxCoeff() > 0.0; }
 
 }  // namespace
 
@@ -145,7 +146,14 @@ std::string MotionHistory::add(const OdometrySample& sample) {
   const double norm = Eigen::Quaterniond(sample.T_odom_base.linear()).norm();
   if (!sample.T_odom_base.matrix().allFinite() || !(std::abs(norm - 1.0) < 1e-3))
     return "its pose is none: left out";
-  return append(sample, &odometry_);
+  if (isStated(sample.pose_covariance) && isStated(sample.twist_covariance))
+    return append(sample, &odometry_);
+  OdometrySample without = sample;
+  for (Matrix6* covariance : {&without.pose_covariance, &without.twist_covariance})
+    if (!isStated(*covariance)) covariance->setZero();
+  const std::string wrong = append(without, &odometry_);
+  return wrong.empty() ? "its covariance is none (negative, or not finite): the options count"
+                       : wrong;
 }
 
 std::string MotionHistory::add(const GyroSample& sample) {

@@ -50,6 +50,8 @@ std::string scaleSourceName(ScaleSource source) {
       return "tag";
     case ScaleSource::kChessboard:
       return "chessboard";
+    case ScaleSource::kCameraHeight:
+      return "camera_height";
   }
   return "";
 }
@@ -94,7 +96,9 @@ double cameraBitsPerMillisecond(const TrackedFrame& frame) {
 /// The state of the tracker, of which every frame gives an account.
 void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->scale_source = scale_source_;
-  if (options_.motion.hasOdometry() && scale_source_ != ScaleSource::kFree)
+  frame->scale_fault = scale_fault_;
+  if ((options_.motion.hasOdometry() && scale_source_ != ScaleSource::kFree) ||
+      scale_source_ == ScaleSource::kCameraHeight)
     frame->scale_sigma = filter_.scaleSigma();
   if (motion_) frame->motion_source = options_.motion.motion_prior;
   frame->motion_fault = motion_fault_;

@@ -82,6 +82,7 @@ void Tracker::Implementation::clearMap() {
   motion_noise_.reset();
   quality_.reset();
   scale_source_ = ScaleSource::kFree;
+  scale_fault_.clear();
   scale_finder_.reset();
   previous_image_.release();
   poor_frames_ = 0;
@@ -177,6 +178,7 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   if (is_restarted || giveUpWrongMap(current, frame)) return current;
   updateTrackingState(current);
   findScale(frame);
+  scaleByGround(frame);
   if (watchLoop(frame)) return current;
   retakePatches(current);
   lookForLoop(image, frame);

@@ -14,6 +14,7 @@
 #include "active_matching_slam/map/map_monitor.h"
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/tracker/frame_state.h"
+#include "active_matching_slam/tracker/ground_plane.h"
 #include "active_matching_slam/tracker/match_cascade.h"
 #include "active_matching_slam/tracker/motion_history.h"
 #include "active_matching_slam/tracker/scale_finder.h"
@@ -83,7 +84,11 @@ class Tracker::Implementation {
   Eigen::Matrix<double, 6, 1> widestImpulse() const;
   void learnMotion(const UpdateReport& report, const Accelerations& allowed, bool is_jerk);
   bool areDepthsKnown() const;
+  bool canBecomeMetric();
   void findScale(TrackedFrame* frame);
+  std::vector<PointBelow> pointsAround() const;
+  void scaleByGround(TrackedFrame* frame);
+  void becomeMetric(double factor, double relative_sigma, ScaleSource source, TrackedFrame* frame);
   void rescale(double factor);
   FrameState measure(const cv::Mat& image, double interval_s) const;
   std::vector<VisibleFeature> visibleFeatures(std::vector<FeatureId>* behind_mask = nullptr) const;
@@ -215,6 +220,7 @@ class Tracker::Implementation {
   TrackingState state_ = TrackingState::kWaiting;
   std::string reason_;
   ScaleSource scale_source_ = ScaleSource::kFree;
+  std::string scale_fault_;
   cv::Mat previous_image_;
   /// The last image with enough matches, and its camera.
   cv::Mat reference_image_;

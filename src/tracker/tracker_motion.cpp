@@ -75,17 +75,20 @@ bool Tracker::Implementation::areDepthsKnown() const {
   return 2 * points > static_cast<std::ptrdiff_t>(visible.size());
 }
 
+/// Lengths are not in metres yet, and depths are known well enough to say what is one.
+bool Tracker::Implementation::canBecomeMetric() {
+  if (isMetric() || !options_.mapping || poor_frames_ > 0 || state_ != TrackingState::kTracking)
+    return false;
+  if (initialiser_.isDone() || (!initialiser_.areDepthsGuessed() && areDepthsKnown())) return true;
+  scale_finder_.reset();  // depths that are corrected correct the way as well
+  return false;
+}
+
 /// While the scale is free: finds it by how far the odometry has gone meanwhile, and makes the map
 /// metric as soon as it is known well enough. What is left of its error is uncertainty of all
 /// lengths from there on, which the odometry's displacements go on to correct.
 void Tracker::Implementation::findScale(TrackedFrame* frame) {
-  if (!motion_ || !unscaled_velocity_ || !options_.mapping || poor_frames_ > 0 ||
-      state_ != TrackingState::kTracking)
-    return;
-  if (!initialiser_.isDone() && (initialiser_.areDepthsGuessed() || !areDepthsKnown())) {
-    scale_finder_.reset();  // depths that are corrected correct the way as well
-    return;
-  }
+  if (!motion_ || !unscaled_velocity_ || !canBecomeMetric()) return;
   const CameraState& camera = filter_.camera();
   const double dt = predicted_interval_s_;
   const Eigen::Matrix3d R_start =
@@ -104,14 +107,21 @@ void Tracker::Implementation::findScale(TrackedFrame* frame) {
   }
   const auto scale = scale_finder_.scale();
   if (!scale) return;
+  becomeMetric(1.0 / scale->map_units_per_m, scale->relative_sigma, ScaleSource::kOdometry, frame);
+}
+
+/// Takes lengths times `factor` for metres, known to `relative_sigma`.
+void Tracker::Implementation::becomeMetric(double factor, double relative_sigma, ScaleSource source,
+                                           TrackedFrame* frame) {
   initialiser_.end();  // its adjustment would leave the unit of length free
-  frame->rescaled_by = 1.0 / scale->map_units_per_m;
-  rescale(frame->rescaled_by);
+  frame->rescaled_by = factor;
+  rescale(factor);
   submaps_.openTrunk(&filter_);
-  filter_.loosenScale(scale->relative_sigma);
+  filter_.loosenScale(relative_sigma);
   submaps_.closeTrunk(&filter_);
-  scale_source_ = ScaleSource::kOdometry;
-  frame->reason = "the map is metric from here on: its scale is known by odometry";
+  scale_source_ = source;
+  frame->reason =
+      "the map is metric from here on: its scale is known by " + scaleSourceName(source);
 }
 
 }  // namespace active_matching_slam

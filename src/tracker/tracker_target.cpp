@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "active_matching_slam/filter/scale_from_distances.h"
 #include "active_matching_slam/image/warp.h"
@@ -82,8 +83,17 @@ void Tracker::Implementation::scaleByTarget(TrackedFrame* frame) {
   // Four points in a plane have as many distances as a shape and a size have parameters, and one.
   if (scale->chi2 > chiSquareQuantile(scale->degrees, kShapeConfidence)) {
     target_ = {};
+    std::ostringstream fault;
+    fault.precision(2);
+    fault
+        << "known_target is not used: what was taken for it has another shape than it should (its "
+           "distances disagree with each other by chi2 = "
+        << scale->chi2 << " of " << scale->degrees
+        << "): are its kind, its size and the calibration right?";
+    scale_fault_ = fault.str();
     return;
   }
+  scale_fault_.clear();
   submaps_.openTrunk(&filter_);  // the scale is one of all lengths
   takeScale(*estimateScale(filter_, distances), &filter_);
   rescaleBesideFilter(scale->factor);

@@ -82,5 +82,32 @@ TEST_F(RecordedOdometry, MakesTheMapOfACarMetric) {
   EXPECT_LE(slipped, 3);
 }
 
+/// Of the cameras over the ground (Geiger et al. 2012, The KITTI vision benchmark suite).
+constexpr double kCameraHeightM = 1.65;
+
+TEST_F(RecordedOdometry, TheHeightOfTheCameraMakesTheMapOfACarMetric) {
+  test::RecordedRun run;
+  run.name = "kitti_07_first160";
+  const RecordedSequence sequence(recordedDataFolder() + "/" + run.name);
+  TrackerOptions options;
+  options.ground.camera_height_m = kCameraHeightM;
+  Tracker tracker(sequence.camera(), options);
+  sequence.forEachFrame([&](const cv::Mat& image, double stamp_s) {
+    const auto frame = tracker.track(image, stamp_s);
+    if (frame->rescaled_by != 1.0)
+      rescaleRecords(frame->rescaled_by, frame->scale_sigma, frame->map, &run.records);
+    run.records.push_back(recordOf(*frame));
+    return true;
+  });
+  EXPECT_EQ(run.framesTracked(), run.frames());
+  EXPECT_EQ(run.records.back().scale_source, ScaleSource::kCameraHeight);
+  const auto similarity =
+      align(pairPoses(run.tracked(), test::truthOf(run.name)), AlignmentKind::kSimilarity);
+  ASSERT_TRUE(similarity);
+  RecordProperty("rigid_mm", std::to_string(test::errorMm(run, AlignmentKind::kRigid)));
+  RecordProperty("scale", std::to_string(similarity->scale));
+  EXPECT_NEAR(similarity->scale, 1.0, 0.05);
+}
+
 }  // namespace
 }  // namespace active_matching_slam

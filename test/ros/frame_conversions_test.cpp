@@ -74,6 +74,7 @@ TEST(FeatureMessage, StatusesAndKindsHaveTheNumbersOfTheMessage) {
   EXPECT_EQ(ams_msgs::TrackingState::SCALE_KNOWN_TARGET, int(ScaleSource::kKnownTarget));
   EXPECT_EQ(ams_msgs::TrackingState::SCALE_KNOWN_POINTS, int(ScaleSource::kKnownPoints));
   EXPECT_EQ(ams_msgs::TrackingState::SCALE_SERVICE, int(ScaleSource::kService));
+  EXPECT_EQ(ams_msgs::TrackingState::SCALE_CAMERA_HEIGHT, int(ScaleSource::kCameraHeight));
 }
 
 TEST(FeatureMessage, NothingThatIsNotFiniteIsPublished) {

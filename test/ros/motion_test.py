@@ -73,7 +73,7 @@ class MotionTest(harness.TrackerTestCase):
         return self.recording.truth[self.images[index].header.stamp].dot(
             np.linalg.inv(T_BASE_CAMERA))
 
-    def say(self, index, frame='base_link', shift=rospy.Duration(0), move=0.0):
+    def say(self, index, frame='base_link', shift=rospy.Duration(0), move=0.0, variance=1e-4):
         """What odometry and IMU say at the time of an image."""
         stamp = self.image(index).header.stamp + shift
         odometry = Odometry()
@@ -83,7 +83,7 @@ class MotionTest(harness.TrackerTestCase):
         p, q = odometry.pose.pose.position, odometry.pose.pose.orientation
         p.x, p.y, p.z = matrix[:3, 3]
         p.x += move
-        odometry.twist.covariance = [1e-4 if i % 7 == 0 else 0.0 for i in range(36)]
+        odometry.twist.covariance = [variance if i % 7 == 0 else 0.0 for i in range(36)]
         q.x, q.y, q.z, q.w = quaternion_of(matrix)
         self.wheels.publish(odometry)
         imu = Imu()
@@ -116,6 +116,10 @@ class MotionTest(harness.TrackerTestCase):
                          states['/wheeled'].motion_fault)
         self.assertEqual('gyro', states['/flown'].motion_source, states['/flown'].motion_fault)
 
+    def assert_said_once(self, node, topic):
+        said = [m.msg for m in self.log.messages if m.name == node and topic in m.msg]
+        self.assertEqual(1, len(said), said)
+
     def warning(self, node, text):
         return self.log.wait_for(lambda m: m.name == node and m.level >= Log.WARN and text in m.msg)
 
@@ -143,8 +147,7 @@ class MotionTest(harness.TrackerTestCase):
             warning = self.warning(node, topic)
             self.assertIsNotNone(warning)
             self.assertIn('constant velocity', warning.msg)
-            said = [m for m in self.log.messages if m.name == node and topic in m.msg]
-            self.assertEqual(1, len(said), [m.msg for m in said])
+            self.assert_said_once(node, topic)
         diagnostics = self.inbox('/diagnostics', DiagnosticArray)
         for topic in ('/wheels', '/flight/imu'):
             self.assertIsNotNone(diagnostics.wait_for(lambda m: any(
@@ -204,6 +207,40 @@ class MotionTest(harness.TrackerTestCase):
         self.assertEqual('', states['/wheeled'].motion_fault)
         self.assertEqual(TrackingState.TRACKING, states['/wheeled'].state)
         self.assertLess(abs(states['/wheeled'].scale_sigma - before.scale_sigma), 0.01)
+
+    def test_a_covariance_that_is_none_is_named_once_and_the_rest_of_the_message_used(self):
+        self.run_with_motion(0, 5)
+        self.log.clear()
+        for index in range(5, 9):
+            states = self.feed(index, variance=-1.0)
+        self.assertEqual('odometry', states['/wheeled'].motion_source)
+        self.assertIn('covariance', states['/wheeled'].motion_fault)
+        self.assertIsNotNone(self.warning('/wheeled', 'covariance'))
+        self.assert_said_once('/wheeled', '/wheels')
+
+    def test_a_pose_that_is_none_is_named_once_and_left_out(self):
+        self.run_with_motion(0, 5)
+        self.log.clear()
+        for index in range(5, 9):
+            states = self.feed(index, move=math.nan)
+        self.assertIn('pose is none', states['/wheeled'].motion_fault)
+        self.assertIsNotNone(self.warning('/wheeled', 'pose is none'))
+        self.assert_said_once('/wheeled', '/wheels')
+        self.assert_used(self.run_with_motion(9, 12))
+
+    def test_a_wrong_frame_is_named_also_where_nothing_came_at_first(self):
+        for index in range(3):
+            self.feeder.feed_all(self.image(index))
+        self.log.clear()
+        for index in range(3, 6):
+            states = self.feed(index, frame='nowhere')
+        for node in self.trackers:
+            self.assertIn('nowhere', states[node].motion_fault)
+            self.assertIsNotNone(self.warning(node, 'nowhere'))
+        diagnostics = self.inbox('/diagnostics', DiagnosticArray)
+        for _ in self.trackers:
+            self.assertIsNotNone(diagnostics.wait_for(lambda m: any(
+                'nowhere' in s.message for s in m.status)))
 
     def test_an_imu_without_a_gyroscope_is_named(self):
         self.run_with_motion(0, 3)

@@ -52,10 +52,10 @@ TEST_P(EveryScene, IsLitAndLeavesRoomToMove) {
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("room", "office", "walkway", "desk", "checkerboard",
                                            "two_depths", "corridor", "corridor_end", "wall",
-                                           "corridor_loop", "rooms"),
+                                           "corridor_loop", "rooms", "planks"),
                          [](const auto& info) { return info.param; });
 
-TEST(Scenes, EveryListedNameIsTested) { EXPECT_EQ(sceneChoices().size(), 11u); }
+TEST(Scenes, EveryListedNameIsTested) { EXPECT_EQ(sceneChoices().size(), 12u); }
 
 TEST(Scenes, AnUnknownNameIsRefusedWithTheList) {
   try {
@@ -64,7 +64,7 @@ TEST(Scenes, AnUnknownNameIsRefusedWithTheList) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
                  "scene = 'moon' is not one of room, office, walkway, desk, checkerboard, "
-                 "two_depths, corridor, corridor_end, corridor_loop, rooms, wall");
+                 "two_depths, corridor, corridor_end, corridor_loop, rooms, wall, planks");
   }
 }
 

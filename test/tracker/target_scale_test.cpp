@@ -94,7 +94,7 @@ TEST(TargetScale, ATargetThatIsNeverSeenChangesNothing) {
                           *without.track(frame.image, frame.stamp_s)));
 }
 
-TEST(TargetScale, ASheetOfAnotherShapeIsRefused) {
+TEST(TargetScale, ASheetOfAnotherShapeIsRefusedAndThatIsTold) {
   // Said to be twice as wide as it is high, of which there is no such view.
   TargetDescription board = exampleChessboard();
   board.square_m = 0.08;
@@ -102,6 +102,7 @@ TEST(TargetScale, ASheetOfAnotherShapeIsRefused) {
   cv::resize(sheet.picture, sheet.picture, {}, 1.6, 1.0, cv::INTER_NEAREST);
   const ScaledRun run = runWith(filmWith(sheet, 0), board);
   EXPECT_LT(run.scaled_at, 0);
+  EXPECT_NE(run.frames.back()->scale_fault.find("known_target"), std::string::npos);
 }
 
 }  // namespace

@@ -44,7 +44,8 @@ class FramePublisher {
   bool wantsTrace() const;
   bool wantsStructure() const;
 
-  void publishState(const TrackedFrame& frame, const ros::Time& stamp);
+  void publishState(const TrackedFrame& frame, const ros::Time& stamp,
+                    const std::string& motion_fault = {});
   /// Everything else.
   void publish(const TrackedFrame& frame, const FrameContext& context,
                const CameraCalibration& calibration, const TrajectoryLog& trajectory);

@@ -8,11 +8,10 @@
 
 #include <condition_variable>
 #include <memory>
+#include <deque>
 #include <mutex>
 #include <string>
-#include <vector>
 
-#include "active_matching_slam/ros/repeated_warning.h"
 #include "active_matching_slam/tracker/motion_history.h"
 
 namespace active_matching_slam {
@@ -37,6 +36,8 @@ class MotionSubscription {
   /// Takes in all that has come, and waits for what is still missing up to the image's stamp: no
   /// longer than odometry_timeout_s of real time, and not at all where nothing comes.
   void collect(const ros::Time& stamp, const std::string& camera_frame);
+  /// Whether anything came for the image in hand.
+  bool hasCome() const { return has_come_; }
   /// What is wrong with what came, or with the frames; empty: nothing.
   const std::string& fault() const { return fault_; }
 
@@ -49,16 +50,16 @@ class MotionSubscription {
 
   MotionOptions options_;
   std::string topic_, fault_;
+  bool has_come_ = false;
   std::shared_ptr<MotionHistory> history_;
   std::string base_frame_, camera_frame_;  ///< of the last message, and of the place that is known
   std::unique_ptr<tf2_ros::Buffer> buffer_;
   std::unique_ptr<tf2_ros::TransformListener> listener_;
-  RepeatedWarning sample_warning_;
 
   std::mutex mutex_;
   std::condition_variable arrival_;
-  std::vector<nav_msgs::OdometryConstPtr> odometry_;  ///< not taken in yet
-  std::vector<sensor_msgs::ImuConstPtr> imu_;         ///< likewise
+  std::deque<nav_msgs::OdometryConstPtr> odometry_;  ///< not taken in yet
+  std::deque<sensor_msgs::ImuConstPtr> imu_;         ///< likewise
   ros::WallTime last_arrival_;
   ros::Subscriber subscriber_;  // last: ends before what its callbacks use
 };

@@ -61,6 +61,7 @@ class NodeDiagnostics {
   std::string reason_ = "no image yet";
   ScaleSource scale_source_ = ScaleSource::kFree;
   double scale_sigma_ = 0.0;
+  std::string scale_fault_;
   std::string motion_topic_, motion_fault_;
   int motion_frames_ = 0, motion_used_ = 0;  ///< in the interval
   std::size_t features_ = 0;

@@ -2,6 +2,9 @@
 
 #include <ros/ros.h>
 
+#include <algorithm>
+#include <cstring>
+#include <set>
 #include <string>
 
 namespace active_matching_slam {
@@ -25,6 +28,27 @@ class RepeatedWarning {
   static constexpr double kPeriod_s = 5.0;
   std::string cause_;
   ros::WallTime said_;
+};
+
+/// Warnings of faults that go on for long: each kind is logged once. What differs in its numbers
+/// alone is of one kind.
+class OnceWarning {
+ public:
+  void say(const std::string& text) {
+    if (said_.insert(kindOf(text)).second) ROS_WARN_STREAM(text);
+  }
+  bool hasSaid() const { return !said_.empty(); }
+  /// All is well, or begins anew: whatever comes is said again.
+  void forget() { said_.clear(); }
+
+ private:
+  static std::string kindOf(std::string text) {
+    const auto is_of_number = [](char c) { return std::strchr("0123456789.+-e", c) != nullptr; };
+    text.erase(std::remove_if(text.begin(), text.end(), is_of_number), text.end());
+    return text;
+  }
+
+  std::set<std::string> said_;
 };
 
 }  // namespace active_matching_slam

@@ -41,8 +41,10 @@ class MotionHistory {
   void setCamera(const Eigen::Isometry3d& T_base_camera) { T_base_camera_ = T_base_camera; }
   void forgetCamera() { T_base_camera_.reset(); }
   bool hasCamera() const { return T_base_camera_.has_value(); }
+  const std::optional<Eigen::Isometry3d>& camera() const { return T_base_camera_; }
 
-  /// What is wrong with a sample, which is then left out; empty: nothing. A stamp that runs back by
+  /// What is wrong with a sample, which is then left out, or with its covariances, in place of
+  /// which those of the options count; empty: nothing. A stamp that runs back by
   /// more than a second is another time: what was before it is forgotten.
   std::string add(const OdometrySample& sample);
   std::string add(const GyroSample& sample);

@@ -16,7 +16,7 @@ struct MotionOptions {
   double odometry_sigma_turn_rad = 0.01;
   double odometry_resolution_m = 0.001;
   double odometry_resolution_rad = 0.001;
-  double gyro_sigma_rps = 0.004;
+  double gyro_sigma_rps = 0.001;
   double gyro_bias_sigma_rps = 0.1;
   double gyro_bias_walk_rps = 0.0001;
   double gyro_stamp_sigma_s = 0.002;

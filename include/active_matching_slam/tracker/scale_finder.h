@@ -8,8 +8,7 @@
 namespace active_matching_slam {
 
 /// Finds the unit of length of a map of free scale: the ratio of how far the camera has gone by
-/// odometry and in it, over stretches that are each long enough to stand out of the odometry's
-/// errors.
+/// odometry and in it, over stretches that are each long enough to stand out of errors.
 class ScaleFinder {
  public:
   struct Scale {
@@ -25,13 +24,22 @@ class ScaleFinder {
   bool isContradicted() const;
 
  private:
-  double relativeVariance(double m_per_map_unit) const;
+  /// Whose errors a stretch has to stand out of. For the scale the map's: the odometry has no say
+  /// in where stretches end, which its errors would, one way. To compare directions the
+  /// odometry's, which are the larger.
+  enum class Judge { kMap, kOdometry };
+  struct Ways {
+    UncertainVector in_map, by_odometry;  ///< of the stretch in hand
+    /// Over the stretches: products of the two ways without what their errors add to them, and
+    /// what the errors of each make of their product.
+    double map_map = 0.0, map_odometry = 0.0, odometry_odometry = 0.0;
+    double by_map_errors = 0.0, by_odometry_errors = 0.0;
 
-  UncertainVector in_map_, by_odometry_;  ///< of the stretch in hand
-  /// Over the stretches: products of the two ways without what their errors add to them, and what
-  /// the errors of each make of their product.
-  double map_map_ = 0.0, map_odometry_ = 0.0, odometry_odometry_ = 0.0;
-  double by_map_errors_ = 0.0, by_odometry_errors_ = 0.0;
+    void add(const UncertainVector& map_step, const UncertainVector& odometry_step, Judge judge);
+    double relativeVariance(double m_per_map_unit) const;
+  };
+
+  Ways for_scale_, for_direction_;
 };
 
 }  // namespace active_matching_slam

@@ -32,7 +32,8 @@ enum class ScaleSource {
   kService = 3,
   kOdometry = 4,
   kTag = 5,
-  kChessboard = 6
+  kChessboard = 6,
+  kCameraHeight = 7
 };
 std::string scaleSourceName(ScaleSource source);
 
@@ -108,6 +109,8 @@ struct TrackedFrame {
 
   /// Relative standard deviation of lengths as a whole; 0: not known, or scale is free.
   double scale_sigma = 0.0;
+  /// Why what should have made lengths metric was not used; empty: nothing was refused.
+  std::string scale_fault;
   /// By what all lengths of the map were multiplied in this frame, as its scale became known: those
   /// of frames before it count times so much.
   double rescaled_by = 1.0;

@@ -14,6 +14,7 @@
 #include "active_matching_slam/map/relocaliser_options.h"
 #include "active_matching_slam/matching/match_options.h"
 #include "active_matching_slam/math/option_field.h"
+#include "active_matching_slam/tracker/ground_plane.h"
 #include "active_matching_slam/submaps/submap_filter_options.h"
 #include "active_matching_slam/tracker/match_cascade_options.h"
 #include "active_matching_slam/tracker/motion_options.h"
@@ -55,6 +56,7 @@ struct TrackerOptions {
   InitialiserOptions initialisation;
   RelocaliserOptions relocaliser;
   MotionOptions motion;
+  GroundOptions ground;
   std::vector<KnownPoint> known_points;  ///< empty: scale free, world = first camera frame
   TargetDescription target;  ///< looked for while scale is free; its size makes the map metric
   double known_points_search_px = 15.0;    ///< how far each may lie from its image_px
@@ -126,6 +128,7 @@ void TrackerOptions::visitFields(Self& o, Visitor&& visit) {
                        "the same, angular; the less, the more near and far come apart"),
         o.structure_accelerations.angular_rps2, 0.0, 1e3);
   visitOptions(o.motion, visit);
+  visitOptions(o.ground, visit);
   visitOptions(o.filter, visit);
   visitOptions(o.image, visit);
   visitOptions(o.map, visit);

@@ -32,20 +32,24 @@ std::string readSamples(const Bags& bags, const std::string& topic, bool is_gyro
   int samples = 0, faulty = 0;
   forEachMessage(bags, topic, [&](const rosbag::MessageInstance& message) {
     std::string wrong;
-    if (const auto imu = is_gyro ? message.instantiate<sensor_msgs::Imu>() : nullptr) {
-      frame = imu->header.frame_id;
-      GyroSample sample = fromImuMsg(*imu);
-      if (imu->header.stamp.isZero()) sample.stamp_s = message.getTime().toSec();
-      wrong = history->add(sample);
-    } else if (const auto odometry =
-                   is_gyro ? nullptr : message.instantiate<nav_msgs::Odometry>()) {
-      frame = odometry->child_frame_id;
-      OdometrySample sample = fromOdometryMsg(*odometry);
-      if (odometry->header.stamp.isZero()) sample.stamp_s = message.getTime().toSec();
-      wrong = history->add(sample);
-    } else {
-      throw std::runtime_error(topic + " is " + message.getDataType() + ", not " +
-                               (is_gyro ? "sensor_msgs/Imu" : "nav_msgs/Odometry"));
+    try {
+      if (const auto imu = is_gyro ? message.instantiate<sensor_msgs::Imu>() : nullptr) {
+        frame = imu->header.frame_id;
+        GyroSample sample = fromImuMsg(*imu);
+        if (imu->header.stamp.isZero()) sample.stamp_s = message.getTime().toSec();
+        wrong = history->add(sample);
+      } else if (const auto odometry =
+                     is_gyro ? nullptr : message.instantiate<nav_msgs::Odometry>()) {
+        frame = odometry->child_frame_id;
+        OdometrySample sample = fromOdometryMsg(*odometry);
+        if (odometry->header.stamp.isZero()) sample.stamp_s = message.getTime().toSec();
+        wrong = history->add(sample);
+      } else {
+        throw std::runtime_error(topic + " is " + message.getDataType() + ", not " +
+                                 (is_gyro ? "sensor_msgs/Imu" : "nav_msgs/Odometry"));
+      }
+    } catch (const std::invalid_argument& error) {
+      wrong = error.what();
     }
     ++samples;
     if (!wrong.empty()) ++faulty, fault = wrong;
