@@ -39,6 +39,7 @@ constexpr double kApart_px = 20.0;         // from a frozen point, of a new one
 constexpr int kSeenToActivate = 10;        // points of a submap in view
 constexpr int kHardlyMeasured = 5;         // a submap of which fewer were is frozen as it was
 constexpr int kFreezeInterval = 10;        // frames
+constexpr int kMargin = 30;                // features over the maximum: none are activated
 constexpr int kSlack = 15;                 // features over the maximum: freeze at once
 constexpr int kLoopFrames = 300;           // out of view for so long: a loop
 
@@ -375,7 +376,7 @@ class CorridorRun {
         chosen = leaf.id;
       }
     }
-    if (chosen < 0) return false;
+    if (chosen < 0 || !hasRoom(chosen)) return false;
     const double start = processorMs();
     const Leaf leaf = *tree_.find(chosen);
     // Where much drift is to be taken out, rotation and scale of all that hangs on the active map
@@ -387,6 +388,21 @@ class CorridorRun {
     for (FeatureId id : members) frozen_.erase(point_of_.at(id));
     for (FeatureId id : leaf.points.given_ids) frozen_.erase(point_of_.at(id));
     return true;
+  }
+
+  /// Whether the active map may take a submap and its separator; makes room if it can.
+  bool hasRoom(int leaf) {
+    const auto fits = [this, leaf]() {
+      const Conditional& points = tree_.find(leaf)->points;
+      int size = static_cast<int>(filter_.features().size() + points.ids.size());
+      for (FeatureId id : points.given_ids) size += filter_.find(id) == nullptr;
+      return size <= options_.maximum_features + kMargin;
+    };
+    if (fits()) return true;
+    restSeparators();
+    returnUntouched();
+    if (!fits()) freezeOne();
+    return fits();
   }
 
   /// Whether three standard deviations of its place, seen from the camera, exceed a fifth of its
@@ -426,16 +442,20 @@ class CorridorRun {
       filter_.removeFeatures(deleted);
       return;
     }
+    restSeparators();
+    if (excess() <= 0) return;
+    returnUntouched();
+    if (excess() <= 0) return;
+    if (frame_ - last_freeze_ >= kFreezeInterval || excess() > kSlack) freezeOne();
+  }
+
+  void restSeparators() {
     Ids separators;
     for (const FeatureState& feature : filter_.features()) {
       if (tree_.isSeparator(feature.id) && isResting(feature.id)) separators.push_back(feature.id);
     }
     tree_.rest(active_, separators);
     for (FeatureId id : separators) frozen_.insert(point_of_.at(id));
-    if (excess() <= 0) return;
-    returnUntouched();
-    if (excess() <= 0) return;
-    if (frame_ - last_freeze_ >= kFreezeInterval || excess() > kSlack) freezeOne();
   }
 
   /// Submaps that were activated and of which hardly anything was measured go back as they were;
