@@ -39,7 +39,7 @@ constexpr double kApart_px = 20.0;         // from a frozen point, of a new one
 constexpr int kSeenToActivate = 10;        // points of a submap in view
 constexpr int kHardlyMeasured = 5;         // a submap of which fewer were is frozen as it was
 constexpr int kFreezeInterval = 10;        // frames
-constexpr int kMargin = 30;                // features over the maximum: none are activated
+constexpr int kActivationMargin = 30;      // features over the maximum: none are activated
 constexpr int kSlack = 15;                 // features over the maximum: freeze at once
 constexpr int kLoopFrames = 300;           // out of view for so long: a loop
 
@@ -49,13 +49,7 @@ double processorMs() {
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
-
-double mean(const std::vector<double>& values) {
+double meanValue(const std::vector<double>& values) {
   double sum = 0.0;
   for (double value : values) sum += value;
   return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
@@ -174,10 +168,10 @@ class CorridorRun {
     int lap = 0;
     LapSummary summary;
     const auto finishLap = [&]() {
-      summary.nees = mean(nees);
-      summary.nees_median = median(nees);
-      summary.error_m = mean(error);
-      summary.frame_ms = median(ms);
+      summary.nees = meanValue(nees);
+      summary.nees_median = medianOf(nees);
+      summary.error_m = meanValue(error);
+      summary.frame_ms = medianOf(ms);
       summary.points = static_cast<int>(filter_.features().size()) + tree_.frozenCount();
       summary.trunk = static_cast<int>(tree_.trunk().ids().size());
       summary.leaves = static_cast<int>(tree_.leaves().size());
@@ -208,8 +202,8 @@ class CorridorRun {
           std::max(summary.active_most, static_cast<int>(filter_.features().size()));
     }
     finishLap();
-    result_.freeze_ms = median(freeze_ms_);
-    result_.activate_ms = median(activate_ms_);
+    result_.freeze_ms = medianOf(freeze_ms_);
+    result_.activate_ms = medianOf(activate_ms_);
     return result_;
   }
 
@@ -396,7 +390,7 @@ class CorridorRun {
       const Conditional& points = tree_.find(leaf)->points;
       int size = static_cast<int>(filter_.features().size() + points.ids.size());
       for (FeatureId id : points.given_ids) size += filter_.find(id) == nullptr;
-      return size <= options_.maximum_features + kMargin;
+      return size <= options_.maximum_features + kActivationMargin;
     };
     if (fits()) return true;
     restSeparators();
@@ -421,7 +415,7 @@ class CorridorRun {
               .norm();
       ratio.push_back(3.0 * std::sqrt(relative.diagonal().maxCoeff()) / distance);
     }
-    return median(ratio) > 0.2;
+    return medianOf(ratio) > 0.2;
   }
 
   /// Keeps the active map small.

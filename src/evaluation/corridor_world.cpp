@@ -19,7 +19,7 @@ constexpr double kRoomDepth = 2.5, kRoomWidth = 2.0;
 constexpr double kFarthest = 12.0, kNearest = 0.4;
 
 /// The middle of the corridor.
-Vector2d middle(double walked) {
+Vector2d middleAt(double walked) {
   const double sides[4] = {kLength - 2.0 * kCorner, kDepth - 2.0 * kCorner, kLength - 2.0 * kCorner,
                            kDepth - 2.0 * kCorner};
   const double arc = 0.5 * M_PI * kCorner;
@@ -43,7 +43,7 @@ Vector2d middle(double walked) {
   return place;
 }
 
-bool within(const Vector2d& place, const Vector2d& low, const Vector2d& high) {
+bool isWithin(const Vector2d& place, const Vector2d& low, const Vector2d& high) {
   return (place.array() >= low.array()).all() && (place.array() <= high.array()).all();
 }
 
@@ -89,11 +89,11 @@ CorridorWorld::CorridorWorld(int points, std::uint64_t seed) {
       point.z() = uniform(0.1, kHeight);
     } else {  // on a wall, the floor or the ceiling
       const double walked = uniform(0.0, lapLength());
-      const Vector2d ahead = (middle(walked + 0.05) - middle(walked - 0.05)).normalized();
+      const Vector2d ahead = (middleAt(walked + 0.05) - middleAt(walked - 0.05)).normalized();
       const Vector2d left(-ahead.y(), ahead.x());
       const double beside = kind < 0.7 ? (uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) * kHalfWidth * 0.999
                                        : uniform(-kHalfWidth, kHalfWidth);
-      const Vector2d place = middle(walked) + beside * left;
+      const Vector2d place = middleAt(walked) + beside * left;
       const double height = kind < 0.7 ? uniform(0.05, kHeight) : (kind < 0.85 ? 0.0 : kHeight);
       point << place, height;
     }
@@ -115,19 +115,19 @@ double CorridorWorld::sway(int axis, double time_s) const {
 
 bool CorridorWorld::isOpen(const Vector2d& place) const {
   const Vector2d outer(kHalfWidth, kHalfWidth);
-  const bool in_ring = within(place, -outer, Vector2d(kLength, kDepth) + outer) &&
+  const bool in_ring = isWithin(place, -outer, Vector2d(kLength, kDepth) + outer) &&
                        !(place.x() > kHalfWidth && place.x() < kLength - kHalfWidth &&
                          place.y() > kHalfWidth && place.y() < kDepth - kHalfWidth);
   if (in_ring) return true;
   for (const Room& room : rooms_) {
-    if (within(place, room.low, room.high)) return true;
+    if (isWithin(place, room.low, room.high)) return true;
   }
   return false;
 }
 
 Eigen::Isometry3d CorridorWorld::cameraInBuilding(double walked_m, double time_s) const {
-  const Vector2d place = middle(walked_m);
-  const Vector2d ahead = (middle(walked_m + 0.9) - middle(walked_m - 0.4)).normalized();
+  const Vector2d place = middleAt(walked_m);
+  const Vector2d ahead = (middleAt(walked_m + 0.9) - middleAt(walked_m - 0.4)).normalized();
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.linear().col(2) << ahead, 0.0;
   T.linear().col(1) = -Vector3d::UnitZ();

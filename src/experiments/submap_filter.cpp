@@ -5,31 +5,25 @@
 #include <algorithm>
 
 #include "active_matching_slam/evaluation/corridor_laps.h"
+#include "active_matching_slam/math/quantile.h"
 #include "workbench.h"
 
 namespace active_matching_slam {
 namespace {
 
-struct Variant {
+struct MapVariant {
   const char* name;
   CorridorOptions options;
 };
 
-Variant variant(const char* name, double laps, MapBound bound, SubmapBorders borders,
-                bool conservative) {
+MapVariant mapVariant(const char* name, double laps, MapBound bound, SubmapBorders borders,
+                      bool conservative) {
   CorridorOptions options;
   options.laps = laps;
   options.bound = bound;
   options.borders = borders;
   options.freeze.conservative = conservative;
   return {name, options};
-}
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
 }
 
 /// Of the submaps frozen in one lap.
@@ -47,13 +41,13 @@ ExperimentResult runSubmapFilter(Workbench& bench) {
   constexpr auto kInformation = SubmapBorders::kInformation;
   constexpr auto kNaive = SubmapBorders::kNaive;
   constexpr auto kSubmaps = MapBound::kSubmaps;
-  std::vector<Variant> variants = {
-      variant("information_conservative", 4.05, kSubmaps, kInformation, true),
-      variant("information_dropped", 4.05, kSubmaps, kInformation, false),
-      variant("naive_conservative", 2.12, kSubmaps, kNaive, true),
-      variant("naive_dropped", 2.12, kSubmaps, kNaive, false),
-      variant("deleted", 2.12, MapBound::kDelete, kInformation, true),
-      variant("whole_map", 2.12, MapBound::kNone, kInformation, true)};
+  std::vector<MapVariant> variants = {
+      mapVariant("information_conservative", 4.05, kSubmaps, kInformation, true),
+      mapVariant("information_dropped", 4.05, kSubmaps, kInformation, false),
+      mapVariant("naive_conservative", 2.12, kSubmaps, kNaive, true),
+      mapVariant("naive_dropped", 2.12, kSubmaps, kNaive, false),
+      mapVariant("deleted", 2.12, MapBound::kDelete, kInformation, true),
+      mapVariant("whole_map", 2.12, MapBound::kNone, kInformation, true)};
   int seeds = 10;
   if (bench.quick()) {
     seeds = 1;
@@ -64,20 +58,20 @@ ExperimentResult runSubmapFilter(Workbench& bench) {
               "submaps", "active_most", "lost_bits_median", "frame_ms"});
   Table runs(
       {"variant", "seed", "error_before_loop_m", "error_after_loop_m", "freeze_ms", "activate_ms"});
-  for (const Variant& variant : variants) {
+  for (const MapVariant& chosen : variants) {
     // The whole map in one filter takes minutes a run.
-    const int count = variant.options.bound == MapBound::kNone ? std::min(seeds, 2) : seeds;
+    const int count = chosen.options.bound == MapBound::kNone ? std::min(seeds, 2) : seeds;
     for (int seed = 0; seed < count; ++seed) {
-      bench.say(text("submap filter, %s, seed %d", variant.name, seed));
-      const CorridorResult run = runCorridorLaps(variant.options, static_cast<std::uint64_t>(seed));
+      bench.say(text("submap filter, %s, seed %d", chosen.name, seed));
+      const CorridorResult run = runCorridorLaps(chosen.options, static_cast<std::uint64_t>(seed));
       for (std::size_t lap = 0; lap < run.laps.size(); ++lap) {
         const LapSummary& summary = run.laps[lap];
-        laps.add({variant.name, seed, static_cast<int>(lap) + 1, summary.nees, summary.nees_median,
+        laps.add({chosen.name, seed, static_cast<int>(lap) + 1, summary.nees, summary.nees_median,
                   summary.error_m, summary.points, summary.trunk, summary.leaves,
                   summary.active_most, medianBits(run, run.lost_bits, static_cast<int>(lap)),
                   summary.frame_ms});
       }
-      runs.add({variant.name, seed, run.error_before_loop_m, run.error_after_loop_m, run.freeze_ms,
+      runs.add({chosen.name, seed, run.error_before_loop_m, run.error_after_loop_m, run.freeze_ms,
                 run.activate_ms});
     }
   }
