@@ -94,47 +94,6 @@ void append(Ekf& filter, const std::vector<Vector3d>& points, const MatrixXd& cr
   filter.restore(filter.camera(), features, P, next);
 }
 
-/// The filter under test, as the tree sees it.
-class FilterMap : public ActiveMap {
- public:
-  explicit FilterMap(Ekf& filter) : filter_(filter) {}
-  PointGaussian points() const override { return activePoints(filter_); }
-  MatrixXd covariance() const override { return filter_.covariance(); }
-  std::vector<int> rows() const override { return activePointRows(filter_); }
-  void remove(const Ids& ids) override { filter_.removeFeatures(ids); }
-  void inflate(const MatrixXd& added) override {
-    const MatrixXd P = filter_.covariance() + added;
-    filter_.restore(filter_.camera(), filter_.features(), P, filter_.nextId());
-  }
-  void insert(const Conditional& points) override {
-    const PointInsertion insertion = pointInsertion(filter_, points);
-    // Behind the others, and then by ascending id.
-    std::vector<FeatureState> features = filter_.features();
-    std::vector<std::pair<FeatureId, std::size_t>> order;
-    features.insert(features.end(), insertion.features.begin(), insertion.features.end());
-    for (std::size_t i = 0; i < features.size(); ++i) order.emplace_back(features[i].id, i);
-    std::sort(order.begin(), order.end());
-    const Index camera = filter_.stateSize() - 3 * static_cast<Index>(filter_.features().size());
-    std::vector<int> rows;
-    std::vector<FeatureState> sorted;
-    for (int row = 0; row < camera; ++row) rows.push_back(row);
-    for (const auto& [id, i] : order) {
-      sorted.push_back(features[i]);
-      for (int axis = 0; axis < 3; ++axis) {
-        rows.push_back(static_cast<int>(camera + 3 * static_cast<Index>(i)) + axis);
-      }
-    }
-    const Index before = filter_.stateSize(), added = insertion.own_covariance.rows();
-    MatrixXd P(before + added, before + added);
-    P << filter_.covariance(), insertion.cross_covariance.transpose(), insertion.cross_covariance,
-        insertion.own_covariance;
-    filter_.restore(filter_.camera(), sorted, selectBlock(P, rows, rows), filter_.nextId());
-  }
-
- private:
-  Ekf& filter_;
-};
-
 class CorridorRun {
  public:
   CorridorRun(const CorridorOptions& options, std::uint64_t seed)
@@ -516,7 +475,7 @@ class CorridorRun {
     bits.lap = lap_;
     for (SubmapBorders borders : {SubmapBorders::kInformation, SubmapBorders::kNaive}) {
       Ekf filter = filter_;
-      FilterMap map(filter);
+      EkfActiveMap map(filter);
       SubmapTree tree = tree_;
       const Ids separator = separatorOf(members, borders, options);
       const int id = tree.freeze(map, members, separator, {}, options);
@@ -597,7 +556,7 @@ class CorridorRun {
   CameraModel model_;
   std::unique_ptr<CameraModel> true_model_;
   Ekf filter_;
-  FilterMap active_;
+  EkfActiveMap active_;
   SubmapTree tree_;
   Eigen::Isometry3d truth_;
   int frame_ = 0, lap_ = 0, last_freeze_ = 0;
