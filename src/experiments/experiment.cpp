@@ -54,6 +54,8 @@ const std::vector<Experiment>& experiments() {
       {{"eq_7_33", "equation 7.33: matchers on a map of keyframes"}, runKeyframeMap},
       {{"lucas_kanade", "what else one would take: pyramidal Lucas-Kanade and RANSAC PnP"},
        runLucasKanade},
+      {{"submap_filter", "chapter 8: laps with a filter on a tree of submaps, MI against naive"},
+       runSubmapFilter},
   };
   return list;
 }

@@ -91,5 +91,6 @@ ExperimentResult runTrajectories(Workbench& bench);
 ExperimentResult runMatchError(Workbench& bench);
 ExperimentResult runKeyframeMap(Workbench& bench);
 ExperimentResult runLucasKanade(Workbench& bench);
+ExperimentResult runSubmapFilter(Workbench& bench);
 
 }  // namespace active_matching_slam
