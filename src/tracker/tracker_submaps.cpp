@@ -17,8 +17,9 @@ constexpr int kReactivationPeriodFrames = 4;
 /// With room left for fewer features, some are laid aside. Cost: with less room, features are begun
 /// later in a view that changes fast; with more, some leave that are soon to be seen again.
 constexpr int kRoomLeft = 15;
-/// Submaps in which the camera is looked for in an image. Cost: each takes as long as a frame.
-constexpr int kSubmapsPerLook = 3;
+/// Submaps in which the camera is looked for in an image, while it is tracked and while it is lost.
+/// Cost: each takes as long as a frame or two.
+constexpr int kSubmapsPerLook = 1, kSubmapsPerLookWhileLost = 3;
 /// Features matched in so many images before a loop are carried along with the camera to where its
 /// submap shows it: a start for the correction, no more. Cost: iterations.
 constexpr std::int64_t kCarriedImages = 40;
@@ -180,7 +181,7 @@ bool Tracker::Implementation::watchLoop(TrackedFrame* frame) {
 bool Tracker::Implementation::relocaliseInSubmaps(const cv::Mat& image, TrackedFrame* frame) {
   if (!submaps_.isEnabled() || submaps_.tree().leaves().empty()) return false;
   const auto positions = submaps_.positions(filter_);
-  for (const int submap : submaps_.inTurn(kSubmapsPerLook)) {
+  for (const int submap : submaps_.inTurn(kSubmapsPerLookWhileLost)) {
     const auto found =
         relocaliser_.find(camera_, image, submaps_.landmarks(submap, positions), mask_);
     if (!found) continue;
