@@ -46,8 +46,8 @@ int valuesOfRow(const cv::Mat& first, const cv::Mat& second, const cv::Mat& used
 }
 
 /// Sums of the products of all values.
-Gram gramOf(const cv::Mat& first, const cv::Mat& second, const cv::Mat& used,
-            const RigidWarp& warp, RowValues* values) {
+Gram gramOf(const cv::Mat& first, const cv::Mat& second, const cv::Mat& used, const RigidWarp& warp,
+            RowValues* values) {
   Gram gram = Gram::Zero();
   for (int y = 0; y < first.rows; ++y) {
     const int n = valuesOfRow(first, second, used, warp, y, values);

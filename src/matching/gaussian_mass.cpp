@@ -180,9 +180,7 @@ constexpr double kFarthest = 6.5;
 struct Arc {
   const WhitenedEllipse& e;
   double speed() const { return e.long_axis; }  ///< at most
-  Eigen::Vector2d point(double t) const {
-    return e.d + e.b0 * std::cos(t) + e.b1 * std::sin(t);
-  }
+  Eigen::Vector2d point(double t) const { return e.d + e.b0 * std::cos(t) + e.b1 * std::sin(t); }
   /// kernel(|y|^2) (y x dy / dt)
   double integrand(double t) const {
     const double c = std::cos(t), s = std::sin(t);
@@ -202,8 +200,9 @@ struct Segment {
   }
 };
 
-/// Integral of a long curve's integrand, bisected down to parts of `longest` in t. Far from the mean
-/// the kernel is 1 / |y|^2, and what is left of the integral is the angle that the part spans there.
+/// Integral of a long curve's integrand, bisected down to parts of `longest` in t. Far from the
+/// mean the kernel is 1 / |y|^2, and what is left of the integral is the angle that the part spans
+/// there.
 template <typename Curve>
 double integrateAlong(const Curve& curve, double t0, double t1, double longest) {
   const double middle = 0.5 * (t0 + t1), reach = 0.5 * (t1 - t0) * curve.speed();
@@ -233,8 +232,8 @@ bool isNarrow(const Eigen::Matrix2d& c) {
   return trace < 2.0 * kNarrow2 || det - kNarrow2 * trace + kNarrow2 * kNarrow2 < 0.0;
 }
 
-/// Integral over the unit squares of a row of pixels, from left to right border: rows by quadrature,
-/// along a row by the error function.
+/// Integral over the unit squares of a row of pixels, from left to right border: rows by
+/// quadrature, along a row by the error function.
 double massOfNarrowRow(double v, double left, double right, const Eigen::Vector2d& mean,
                        const Eigen::Matrix2d& c) {
   const double sigma_v = std::sqrt(c(1, 1)), tilt = c(0, 1) / c(1, 1);

@@ -13,10 +13,7 @@ namespace active_matching_slam {
 Mixture::Mixture(const ProperPrior& prior, const std::vector<PriorGaussian>& gaussians,
                  BudgetedSearch& budgeted, std::vector<SearchLikelihood> likelihoods,
                  const MatchOptions& options)
-    : prior_(prior),
-      search_(budgeted),
-      options_(options),
-      likelihoods_(std::move(likelihoods)) {
+    : prior_(prior), search_(budgeted), options_(options), likelihoods_(std::move(likelihoods)) {
   const std::size_t size = slot(prior.size());
   for (int f = 0; f < prior.size(); ++f) valid_.push_back(budgeted.validArea(f));
   first_prior_ = &gaussians.front();

@@ -198,7 +198,8 @@ std::vector<int> MixtureRun::matchesOf(const Explanation& e) const {
 }
 
 void MixtureRun::report(MatchResult& result) const {
-  const std::vector<Explanation> all = mixture_.rescoresJointly() ? mixture_.rescoreJointly() : mixture_.explanations();
+  const std::vector<Explanation> all =
+      mixture_.rescoresJointly() ? mixture_.rescoreJointly() : mixture_.explanations();
   const Explanation& accepted = all.front();
   MatchStatistics& statistics = result.statistics;
   result.is_wide = accepted.hypothesis->prior != mixture_.firstPrior();

@@ -33,8 +33,8 @@ double expectedMatches(const FrameState& frame) {
   return std::accumulate(frame.match_probabilities.begin(), frame.match_probabilities.end(), 0.0);
 }
 
-/// Modelled time of following the features from image to image, of an image of a million pixels, and
-/// of aligning two images [ms]. Cost: medians on one core of about 3 GHz.
+/// Modelled time of following the features from image to image, of an image of a million pixels,
+/// and of aligning two images [ms]. Cost: medians on one core of about 3 GHz.
 constexpr double kFlowMs = 6.0, kAlignmentMs = 4.0;
 
 /// How the image moved since the reference image, which is the same whatever the prior.
@@ -152,8 +152,8 @@ void MatchCascade::matchWithFallbacks(const MatchOptions& matching, FrameState* 
     frame->prior.wide_probability = frame->jerk_probability;
   }
   const double guided_ms = guide.takeSpentMilliseconds();
-  const double left = std::max(
-      kLeastLeft, 1.0 - fractionOfBudget(withBudget(matching, 1.0, *frame), 0, guided_ms));
+  const double left =
+      std::max(kLeastLeft, 1.0 - fractionOfBudget(withBudget(matching, 1.0, *frame), 0, guided_ms));
   frame->matching =
       matcher_->match(guided ? *guided : frame->prior, frame->search,
                       withBudget(matching, left * options_.first_budget_fraction, *frame));

@@ -33,8 +33,8 @@ TEST(AlignByCorrelation, EndsWhereOpencvsDoes) {
     cv::Mat expected = cv::Mat::eye(2, 3, CV_32F);
     const double correlation = cv::findTransformECC(
         first, second, expected, cv::MOTION_EUCLIDEAN,
-        cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-7),
-        cv::noArray(), 1);
+        cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-7), cv::noArray(),
+        1);
     RigidWarp warp;
     // OpenCV's is less by what it takes for black beyond the border.
     EXPECT_GT(alignByCorrelation(first, second, {}, kUntilNothingIsGained, &warp), correlation)
