@@ -1,5 +1,7 @@
 #include "active_matching_slam/map/map_monitor.h"
 
+#include <algorithm>
+
 namespace active_matching_slam {
 namespace {
 
@@ -11,8 +13,23 @@ constexpr double kMemory = 0.1;  ///< Cost: weight of an image in the mean; of a
 
 }  // namespace
 
-void MapMonitor::add(double stamp_s, int predicted, int matched, double sharpness) {
-  const bool is_good = matched >= kMajority * predicted;
+/// Notes what is predicted, and returns the newest feature that is old enough.
+FeatureId MapMonitor::newestJudged(double stamp_s, const std::vector<FeatureId>& predicted) {
+  FeatureId newest = newest_.empty() ? -1 : newest_.back().id;
+  for (const FeatureId id : predicted) newest = std::max(newest, id);
+  newest_.push_back({stamp_s, newest});
+  while (newest_.size() > 1 && stamp_s - newest_[1].stamp_s >= kPatienceS) newest_.pop_front();
+  return newest_.front().id;
+}
+
+void MapMonitor::add(double stamp_s, const std::vector<FeatureId>& predicted,
+                     const std::vector<FeatureId>& matched, double sharpness) {
+  const FeatureId newest = newestJudged(stamp_s, predicted);
+  const auto judged = [newest](const std::vector<FeatureId>& ids) {
+    return static_cast<double>(
+        std::count_if(ids.begin(), ids.end(), [newest](FeatureId id) { return id <= newest; }));
+  };
+  const bool is_good = judged(matched) >= kMajority * judged(predicted);
   if (is_good && last_stamp_s_ >= 0.0) right_s_ += stamp_s - last_stamp_s_;
   last_stamp_s_ = stamp_s;
   if (is_good) {

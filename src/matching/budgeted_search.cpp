@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "active_matching_slam/matching/search_ellipse.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
 namespace {
@@ -28,7 +30,12 @@ SearchOutcome BudgetedSearch::search(int feature, const SearchEllipse& ellipse) 
   correlation_s_ += now() - start;
   ++searches_;
   pixels_ += outcome.correlations;
-  charge(modelledSearch_ms(static_cast<double>(outcome.correlations)));
+  const double rows = 2.0 * std::sqrt(kEllipseRadius2 * std::max(ellipse.covariance(1, 1), 0.0));
+  const PixelBox valid = validArea(feature);
+  const double most = valid.isUnbounded() ? rows : valid.max_v - valid.min_v + 1.0;
+  charge(modelledSearch_ms(static_cast<double>(outcome.correlations)) +
+         kEllipseRowMs * std::max(std::min(rows, most), 0.0) +
+         kMatchMs * static_cast<double>(outcome.matches.size()));
   return outcome;
 }
 

@@ -172,8 +172,58 @@ double integrate(double t0, double t1, int pieces, F f) {
   return sum * half;
 }
 
-/// Beyond this many sigma a sum over pixels has nothing left to find.
+/// Beyond this many sigma nothing is left to find: for a sum over pixels, and of the exponential in
+/// a contour's integrand.
 constexpr double kFarthest = 6.5;
+
+/// Arc d + b0 cos t + b1 sin t, in whitened coordinates.
+struct Arc {
+  const WhitenedEllipse& e;
+  double speed() const { return e.long_axis; }  ///< at most
+  Eigen::Vector2d point(double t) const { return e.d + e.b0 * std::cos(t) + e.b1 * std::sin(t); }
+  /// kernel(|y|^2) (y x dy / dt)
+  double integrand(double t) const {
+    const double c = std::cos(t), s = std::sin(t);
+    const Eigen::Vector2d y = e.d + e.b0 * c + e.b1 * s;
+    return cross(y, e.b1 * c - e.b0 * s) * kernel(y.squaredNorm());
+  }
+};
+
+/// y0 + t step, the same.
+struct Segment {
+  Eigen::Vector2d y0, step;
+  double speed() const { return step.norm(); }
+  Eigen::Vector2d point(double t) const { return y0 + t * step; }
+  double integrand(double t) const {
+    const Eigen::Vector2d y = point(t);
+    return cross(y, step) * kernel(y.squaredNorm());
+  }
+};
+
+/// Integral of a long curve's integrand, bisected down to parts of `longest` in t. Far from the
+/// mean the kernel is 1 / |y|^2, and what is left of the integral is the angle that the part spans
+/// there.
+template <typename Curve>
+double integrateAlong(const Curve& curve, double t0, double t1, double longest) {
+  const double middle = 0.5 * (t0 + t1), reach = 0.5 * (t1 - t0) * curve.speed();
+  if (curve.point(middle).norm() - reach > kFarthest) {
+    const Eigen::Vector2d a = curve.point(t0), b = curve.point(t1);
+    return std::atan2(cross(a, b), a.dot(b));
+  }
+  if (t1 - t0 <= longest)
+    return integrate(t0, t1, 1, [&curve](double t) { return curve.integrand(t); });
+  return integrateAlong(curve, t0, middle, longest) + integrateAlong(curve, middle, t1, longest);
+}
+
+/// The same of any, of which parts of `longest` are short enough for quadrature.
+template <typename Curve>
+double contourIntegral(const Curve& curve, double t0, double t1, double longest) {
+  constexpr double kShort = 16.0;  // parts, with which looking for far ones does not pay
+  const double parts = std::max(std::ceil((t1 - t0) / longest), 1.0);
+  if (parts > kShort) return integrateAlong(curve, t0, t1, longest);
+  return integrate(t0, t1, static_cast<int>(parts),
+                   [&curve](double t) { return curve.integrand(t); });
+}
 
 /// Whether a sigma along any direction is below 0.4 px.
 bool isNarrow(const Eigen::Matrix2d& c) {
@@ -182,22 +232,29 @@ bool isNarrow(const Eigen::Matrix2d& c) {
   return trace < 2.0 * kNarrow2 || det - kNarrow2 * trace + kNarrow2 * kNarrow2 < 0.0;
 }
 
-/// Integral over the unit square around m: rows by quadrature, along a row by the error function.
-double massOfNarrowPixel(const Eigen::Vector2d& m, const Eigen::Vector2d& mean,
-                         const Eigen::Matrix2d& c) {
+/// Integral over the unit squares of a row of pixels, from left to right border: rows by
+/// quadrature, along a row by the error function.
+double massOfNarrowRow(double v, double left, double right, const Eigen::Vector2d& mean,
+                       const Eigen::Matrix2d& c) {
   const double sigma_v = std::sqrt(c(1, 1)), tilt = c(0, 1) / c(1, 1);
   const double scale = 1.0 / std::sqrt(2.0 * (c(0, 0) - tilt * c(0, 1)));
-  const double low = std::max(m.y() - 0.5, mean.y() - kFarthest * sigma_v);
-  const double high = std::min(m.y() + 0.5, mean.y() + kFarthest * sigma_v);
+  const double low = std::max(v - 0.5, mean.y() - kFarthest * sigma_v);
+  const double high = std::min(v + 0.5, mean.y() + kFarthest * sigma_v);
   if (!(low < high)) return 0.0;
   // Steps fine enough for the row's Gaussian and for the slant of a thin ridge.
   const double finest = std::min(sigma_v, 1.0 / (1e-3 + scale * std::abs(tilt)));
   const int pieces = static_cast<int>(std::clamp((high - low) / finest + 1.0, 1.0, 64.0));
-  const double sum = integrate(low, high, pieces, [&](double v) {
-    const double d = (v - mean.y()) / sigma_v, u = m.x() - mean.x() - tilt * (v - mean.y());
-    return std::exp(-0.5 * d * d) * (std::erf((u + 0.5) * scale) - std::erf((u - 0.5) * scale));
+  const double sum = integrate(low, high, pieces, [&](double y) {
+    const double d = (y - mean.y()) / sigma_v, middle = mean.x() + tilt * (y - mean.y());
+    return std::exp(-0.5 * d * d) *
+           (std::erf((right - middle) * scale) - std::erf((left - middle) * scale));
   });
   return 0.5 * sum / (sigma_v * std::sqrt(2.0 * M_PI));
+}
+
+double massOfNarrowPixel(const Eigen::Vector2d& m, const Eigen::Vector2d& mean,
+                         const Eigen::Matrix2d& covariance) {
+  return massOfNarrowRow(m.y(), m.x() - 0.5, m.x() + 0.5, mean, covariance);
 }
 
 /// Sum of p over a run of pixels, for Gaussians narrower than pixels resolve.
@@ -213,10 +270,8 @@ class NarrowRuns {
     if (std::abs(run.v - mean_.y()) > reach_v_) return 0.0;
     const double first = std::max<double>(run.begin_u, std::ceil(mean_.x() - reach_u_));
     const double last = std::min<double>(run.end_u - 1, std::floor(mean_.x() + reach_u_));
-    double sum = 0.0;
-    for (double u = first; u <= last; u += 1.0)
-      sum += massOfNarrowPixel({u, run.v}, mean_, covariance_);
-    return sum;
+    return first <= last ? massOfNarrowRow(run.v, first - 0.5, last + 0.5, mean_, covariance_)
+                         : 0.0;
   }
 
  private:
@@ -385,26 +440,13 @@ double ClippedEllipse::mass(const Eigen::Vector2d& mean, const Eigen::Matrix2d& 
   const Whitener whiten(covariance);
   const WhitenedEllipse e(whiten(center_ - mean), whiten(axis0_), whiten(axis1_));
   if (e.obviousMass() == 0.0) return 0.0;
-  constexpr double kPiece = 2.0;  // sigma
-  constexpr int kMostPieces = 400;
+  constexpr double kPart = 2.0, kPartOfTurn = 0.8;  // sigma; radians
   double sum = 0.0;
-  for (const auto& [t0, t1] : arcs_) {
-    const double pieces = std::ceil((t1 - t0) * std::max(e.long_axis / kPiece, 1.25));
-    sum +=
-        integrate(t0, t1, static_cast<int>(std::min<double>(pieces, kMostPieces)), [&](double t) {
-          const double c = std::cos(t), s = std::sin(t);
-          const Eigen::Vector2d y = e.d + e.b0 * c + e.b1 * s;
-          return cross(y, e.b1 * c - e.b0 * s) * kernel(y.squaredNorm());
-        });
-  }
+  const double longest = std::min(kPart / e.long_axis, kPartOfTurn);
+  for (const auto& [t0, t1] : arcs_) sum += contourIntegral(Arc{e}, t0, t1, longest);
   for (const auto& [a, b] : segments_) {
-    const Eigen::Vector2d y0 = whiten(a - mean), step = whiten(b - a);
-    const double pieces = std::max(std::ceil(step.norm() / kPiece), 1.0);
-    sum +=
-        integrate(0.0, 1.0, static_cast<int>(std::min<double>(pieces, kMostPieces)), [&](double t) {
-          const Eigen::Vector2d y = y0 + t * step;
-          return cross(y, step) * kernel(y.squaredNorm());
-        });
+    const Segment segment{whiten(a - mean), whiten(b - a)};
+    sum += contourIntegral(segment, 0.0, 1.0, std::min(kPart / segment.speed(), 1.0));
   }
   return std::clamp(sum / (2.0 * M_PI), 0.0, 1.0);
 }

@@ -5,11 +5,10 @@
 #include "active_matching_slam/math/slot.h"
 #include "baseline_matchers.h"
 #include "gate_search.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
 namespace {
-
-constexpr double kNodeMs = 1e-5;  ///< modelled cost
 
 /// Depth-first branch and bound over the features in index order. The Cholesky factor of the paired
 /// features' covariance grows and shrinks with the branch; it depends on which features are paired,
@@ -95,6 +94,7 @@ class BranchAndBound {
     std::vector<Choice> choices;
     if (gates_[slot(feature)].empty()) return choices;
     const Rows& rows = updatedRows(feature, depth);
+    search_.charge(kConditionedMs * depth);
     Eigen::Matrix2d conditional = prior_.covariance(feature);
     Eigen::Vector2d expected = prior_.mean(feature);
     for (int j = 0; j < depth; ++j) {

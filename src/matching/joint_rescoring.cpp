@@ -8,6 +8,7 @@
 #include "active_matching_slam/math/slot.h"
 #include "gaussian_mass.h"
 #include "mixture.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
 namespace {
@@ -30,6 +31,7 @@ class PredictionChain {
   /// Prediction of the feature, given those that are known.
   SearchEllipse predict(int feature) {
     const auto n = static_cast<Eigen::Index>(known_.size());
+    spent_ms_ += kPredictionMs + kPredictionSquareMs * static_cast<double>(n * n);
     cross_.resize(2 * n, 2);
     for (Eigen::Index i = 0; i < n; ++i)
       cross_.middleRows<2>(2 * i) =
@@ -50,9 +52,13 @@ class PredictionChain {
     known_.push_back(feature);
   }
 
+  /// Modelled, of all predictions so far.
+  double spentMilliseconds() const { return spent_ms_; }
+
  private:
   const ProperPrior& prior_;
   const Eigen::MatrixXd& S_;
+  double spent_ms_ = 0.0;
   std::vector<int> known_;
   Eigen::MatrixXd factor_;  // lower Cholesky factor of the covariance of what is known
   Eigen::VectorXd whitened_;
@@ -110,6 +116,7 @@ Mixture::Evidence Mixture::evidenceOf(const Hypothesis& h, const std::vector<int
     evidence.log_evidence += log_likelihood;
     evidence.log_likelihood += log_likelihood;
   }
+  charge(chain.spentMilliseconds());
   return evidence;
 }
 
@@ -137,6 +144,7 @@ Mixture::FeatureEvidence Mixture::featureEvidence(const Hypothesis& h, int f,
     evidence.best_likelihood = likelihood.match * p;
     evidence.best = m;
   }
+  charge(kRunMs * static_cast<double>(search_.searchedPixels(f).history().size()));
   const double searched = std::min(
       1.0, massOnPixels(search_.searchedPixels(f), predicted.center, predicted.covariance));
   const double missed = likelihood.in * std::max(0.0, searched - all) + 1.0 - searched;

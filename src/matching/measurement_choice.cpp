@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "active_matching_slam/math/slot.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
 namespace {
@@ -63,7 +64,9 @@ ExpectedInformation MeasurementChoice::evaluate(int g, int c) {
     match_sum += weight * term.match;
     match_log += weighted_log * term.match + weight * term.match_log;
   };
-  for (const Group& group : groupsOf(gate.feature)) {
+  const std::vector<Group>& groups = groupsOf(gate.feature);
+  mixture_.charge(kTermMs * static_cast<double>(groups.size()));
+  for (const Group& group : groups) {
     const bool is_own =
         own_entry == PairTable::kNone ? group.representative == g : group.entry == own_entry;
     if (!is_own) {
@@ -131,6 +134,7 @@ Measurement MeasurementChoice::best() {
   if (promising.exists()) consider(promising.hypothesis, promising.candidate);
   for (int g = 0; g < static_cast<int>(all.size()); ++g) {
     const Hypothesis& h = all[slot(g)];
+    mixture_.charge(kLookMs * static_cast<double>(h.candidates.size()));
     for (int c = 0; c < static_cast<int>(h.candidates.size()); ++c) {
       const Hypothesis::Candidate& gate = h.candidates[slot(c)];
       if (!gate.open) continue;

@@ -7,21 +7,13 @@
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "active_matching_slam/math/slot.h"
 #include "gaussian_mass.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
-namespace {
-
-constexpr double kTouchedMs = 6e-5;  ///< modelled cost of a child, for each feature that changes
-
-}  // namespace
-
 Mixture::Mixture(const ProperPrior& prior, const std::vector<PriorGaussian>& gaussians,
                  BudgetedSearch& budgeted, std::vector<SearchLikelihood> likelihoods,
                  const MatchOptions& options)
-    : prior_(prior),
-      search_(budgeted),
-      options_(options),
-      likelihoods_(std::move(likelihoods)) {
+    : prior_(prior), search_(budgeted), options_(options), likelihoods_(std::move(likelihoods)) {
   const std::size_t size = slot(prior.size());
   for (int f = 0; f < prior.size(); ++f) valid_.push_back(budgeted.validArea(f));
   first_prior_ = &gaussians.front();
@@ -70,6 +62,7 @@ double Mixture::computeMass(const Hypothesis& of, const Hypothesis& in,
                             const Hypothesis::Candidate& candidate) const {
   const int f = candidate.feature;
   if (!(of.joint->marginal(f).determinant > 0.0)) return 0.0;
+  charge(candidate.clipped ? kClippedMassMs : kMassMs);
   return candidate.clipped ? ClippedEllipse(in.ellipse(f), valid_[slot(f)])
                                  .mass(of.mean[slot(f)], of.covariance(f))
                            : massInEllipse(in.ellipse(f), of.mean[slot(f)], of.covariance(f));
@@ -165,9 +158,12 @@ bool Mixture::isExhausted(int g, int c) {
     return candidate.checked % 2 == 1;
   const SearchEllipse ellipse = h.ellipse(f);
   bool exhausted = true;
+  int runs = 0;
   forEachEllipseRun(ellipse, valid_[slot(f)], [&](const PixelRun& run) {
+    ++runs;
     if (exhausted) exhausted = searched.countMissing(run) == 0;
   });
+  charge(kRunMs * runs);
   for (std::size_t m = 0; m < known.size() && exhausted; ++m)
     exhausted = !(mahalanobisSquared(ellipse, known[m].pixel) <= kEllipseRadius2) ||
                 liesInAncestry(h, f, known[m].pixel);
@@ -185,6 +181,7 @@ void Mixture::addCandidate(Hypothesis& h, int f) const {
   candidate.bits = marginal.information_bits;
   candidate.clipped = reachesBeyond(ellipse, valid_[slot(f)]);
   if (candidate.clipped) {
+    charge(kClippedMassMs);
     const ClippedEllipse clipped(ellipse, valid_[slot(f)]);
     constexpr double kLeastArea = 1e-3;  // px^2: no pixel to look at
     candidate.area = clipped.area();

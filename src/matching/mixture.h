@@ -172,6 +172,8 @@ class Mixture {
     return options_.joint_rescoring && options_.update_rule == UpdateRule::kIncremental;
   }
 
+  /// Adds to the modelled time.
+  void charge(double milliseconds) const { search_.charge(milliseconds); }
   const PriorGaussian* firstPrior() const { return first_prior_; }
   int mostGaussians() const { return most_gaussians_; }
   bool wasCapped() const { return was_capped_; }

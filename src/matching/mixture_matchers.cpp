@@ -8,6 +8,7 @@
 #include "active_matching_slam/information/gaussian_information.h"
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "mixture_run.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
 namespace {
@@ -15,6 +16,10 @@ namespace {
 /// Cost: modelled time up to which `auto` takes `active` [ms], a third of a frame at 30 Hz. Beyond,
 /// it does so too where chow_liu would not halve the time, as with less than about 130 features.
 constexpr double kAutoMs = 10.0;
+
+void chargeInformation(const ProperPrior& prior, BudgetedSearch& budgeted) {
+  budgeted.charge(kInformationCubeMs * std::pow(prior.size(), 3));
+}
 
 void addWide(const Joint& joint, const Eigen::MatrixXd& S, double probability,
              std::vector<PriorGaussian>* gaussians) {
@@ -28,6 +33,7 @@ MatchResult matchDense(const MeasurementPrior& given, FeatureSearch& search,
   BudgetedSearch budgeted(prior, search, options);
   const double start = budgeted.now();
   FeatureInformation information = featureInformation(prior.S());
+  chargeInformation(prior, budgeted);
   if (information.regularisation > 0.0) {
     prior.leaveOutDependent();
     information = featureInformation(prior.S());
@@ -41,6 +47,7 @@ MatchResult matchDense(const MeasurementPrior& given, FeatureSearch& search,
     std::unique_ptr<Joint> wide;
     if (wide_S.rows() > 0) {
       const FeatureInformation of_wide = featureInformation(wide_S);
+      chargeInformation(prior, budgeted);
       if (of_wide.regularisation == 0.0) {
         wide = makeDenseJoint(wide_S, of_wide.precision_determinant, prior.noiseVariances());
         addWide(*wide, wide_S, prior.wideProbability(), &gaussians);

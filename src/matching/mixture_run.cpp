@@ -11,6 +11,8 @@ namespace {
 /// Cost: fraction of the budget after which the search commits to the heaviest Gaussian whether it
 /// dominates or not.
 constexpr double kCommitFraction = 0.75;
+/// Cost: the same after which nothing more is searched, so that what is known can be re-scored.
+constexpr double kSearchFraction = 0.9;
 
 std::vector<SearchLikelihood> likelihoodsOf(const MeasurementPrior& given, const ProperPrior& prior,
                                             const MatchOptions& options) {
@@ -139,7 +141,7 @@ void MixtureRun::acceptNearest(MatchResult& result) {
   while (true) {
     const Measurement next = choice_.firstOf(dominant);
     if (!next.exists()) return;
-    if (search_.isOverBudget()) {
+    if (search_.fractionUsed() >= kSearchFraction) {
       result.statistics.cut_short = true;
       return;
     }
@@ -196,9 +198,8 @@ std::vector<int> MixtureRun::matchesOf(const Explanation& e) const {
 }
 
 void MixtureRun::report(MatchResult& result) const {
-  const std::vector<Explanation> all = mixture_.rescoresJointly() && !search_.isOverBudget()
-                                           ? mixture_.rescoreJointly()
-                                           : mixture_.explanations();
+  const std::vector<Explanation> all =
+      mixture_.rescoresJointly() ? mixture_.rescoreJointly() : mixture_.explanations();
   const Explanation& accepted = all.front();
   MatchStatistics& statistics = result.statistics;
   result.is_wide = accepted.hypothesis->prior != mixture_.firstPrior();

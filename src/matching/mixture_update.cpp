@@ -7,6 +7,7 @@
 #include "active_matching_slam/math/slot.h"
 #include "gaussian_mass.h"
 #include "mixture.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
 namespace {
@@ -16,8 +17,6 @@ constexpr double kLeastLikelihood = 1e-9;
 /// Log-odds that the better of two near matches is the true one, per difference of their similarity
 /// (ZNCC).
 constexpr double kLogOddsPerScore = 20.0;
-/// Cost: of updating one Gaussian's weight by a feature's search, and of each match.
-constexpr double kWeighingMs = 1e-3, kWeighingMatchMs = 2e-5;
 /// Cost: most pruned hypotheses that are kept for joint re-scoring.
 constexpr std::size_t kMaxPruned = 32;
 
@@ -29,11 +28,13 @@ double Mixture::pixelMass(Hypothesis& h, int f) {
   for (Hypothesis::PixelMass& known : h.pixel_masses) {
     if (known.feature != f) continue;
     if (known.runs < runs.size()) {
+      charge(kRunMs * static_cast<double>(runs.size() - known.runs));
       known.sum += massOnRuns(runs, known.runs, h.mean[slot(f)], h.covariance(f));
       known.runs = runs.size();
     }
     return std::min(1.0, known.sum);
   }
+  charge(kRunMs * static_cast<double>(runs.size()));
   const double sum = massOnPixels(mask, h.mean[slot(f)], h.covariance(f));
   h.pixel_masses.push_back({f, sum, runs.size()});
   return std::min(1.0, sum);

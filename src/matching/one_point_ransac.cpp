@@ -8,6 +8,7 @@
 #include "active_matching_slam/matching/search_ellipse.h"
 #include "baseline_matchers.h"
 #include "gate_search.h"
+#include "modelled_cost.h"
 
 namespace active_matching_slam {
 namespace {
@@ -143,6 +144,7 @@ MatchResult OnePointRansacMatcher::match(const MeasurementPrior& given, FeatureS
   }
   const std::vector<int> hypotheses = drawHypotheses(voters, options);
   result.statistics.nodes = static_cast<std::int64_t>(hypotheses.size());
+  budgeted.charge(kVoteMs * static_cast<double>(hypotheses.size() * voters.size()));
   const OnePointRansac ransac(prior, budgeted, best);
   const std::vector<int> inliers = ransac.inliers(hypotheses, options.ransac_inlier_chi2);
   result.statistics.inliers = static_cast<int>(inliers.size());

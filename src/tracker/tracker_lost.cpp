@@ -26,8 +26,10 @@ constexpr std::size_t kMostLostMaps = 4;  ///< Cost: memory, and time until each
 /// matches mean that the scene, or the view of it, has changed.
 bool Tracker::Implementation::giveUpWrongMap(const FrameState& current, TrackedFrame* frame) {
   if (current.matching.statistics.cut_short) return false;  // not all was looked for
-  map_monitor_.add(last_stamp_s_, current.prior.size(),
-                   static_cast<int>(current.measurements.size()),
+  std::vector<FeatureId> matched;
+  for (const FeatureMeasurement& measurement : current.measurements)
+    matched.push_back(measurement.id);
+  map_monitor_.add(last_stamp_s_, current.prior.ids, matched,
                    measureImageQuality(current.image).sharpness);
   if (!map_monitor_.isWrong() || map_monitor_.hasBeenRight() || !options_.mapping) return false;
   const std::string reason =

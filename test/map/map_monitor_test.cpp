@@ -2,10 +2,20 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+#include <vector>
+
 namespace active_matching_slam {
 namespace {
 
 constexpr double kIntervalS = 1.0 / 30.0, kSharpness = 8.0;
+
+/// `count` features from `first` on.
+std::vector<FeatureId> features(FeatureId first, int count) {
+  std::vector<FeatureId> ids(static_cast<std::size_t>(count));
+  std::iota(ids.begin(), ids.end(), first);
+  return ids;
+}
 
 struct Watch {
   MapMonitor monitor;
@@ -14,7 +24,7 @@ struct Watch {
   /// Whether the map was found wrong within so many seconds of such images.
   bool isWrongWithin(double seconds, int matched, double sharpness) {
     for (const double end_s = stamp_s + seconds; stamp_s < end_s; stamp_s += kIntervalS) {
-      monitor.add(stamp_s, 60, matched, sharpness);
+      monitor.add(stamp_s, features(0, 60), features(0, matched), sharpness);
       if (monitor.isWrong()) return true;
     }
     return false;
@@ -44,6 +54,38 @@ TEST(MapMonitor, AHandThatCrossesTheViewIsNotHeldAgainstTheMap) {
   EXPECT_FALSE(watch.isWrongWithin(0.5, 20, kSharpness));
   EXPECT_FALSE(watch.isWrongWithin(0.1, 45, kSharpness));
   EXPECT_FALSE(watch.isWrongWithin(0.5, 20, kSharpness));
+}
+
+/// A camera that moves on: twenty old features that match, and forty that are new in each image and
+/// don't.
+TEST(MapMonitor, WhatHasJustBeenStartedIsNotHeldAgainstTheMap) {
+  Watch watch;
+  watch.isWrongWithin(3.0, 50, kSharpness);
+  FeatureId next = 1000;
+  for (const double end_s = watch.stamp_s + 5.0; watch.stamp_s < end_s;
+       watch.stamp_s += kIntervalS) {
+    std::vector<FeatureId> predicted = features(0, 20);
+    const std::vector<FeatureId> started = features(next, 40);
+    next += 40;
+    predicted.insert(predicted.end(), started.begin(), started.end());
+    watch.monitor.add(watch.stamp_s, predicted, features(0, 20), kSharpness);
+    ASSERT_FALSE(watch.monitor.isWrong());
+  }
+}
+
+TEST(MapMonitor, WhatNeverMatchesIsHeldAgainstTheMapOnceItIsOld) {
+  Watch watch;
+  watch.isWrongWithin(3.0, 60, kSharpness);
+  std::vector<FeatureId> predicted = features(0, 20);
+  const std::vector<FeatureId> started = features(1000, 40);
+  predicted.insert(predicted.end(), started.begin(), started.end());
+  double judged_s = 0.0;
+  for (; judged_s < 5.0 && !watch.monitor.isWrong(); judged_s += kIntervalS) {
+    watch.stamp_s += kIntervalS;
+    watch.monitor.add(watch.stamp_s, predicted, features(0, 20), kSharpness);
+  }
+  EXPECT_TRUE(watch.monitor.isWrong());
+  EXPECT_GT(judged_s, 1.0) << "not while they are new";
 }
 
 TEST(MapMonitor, AMapThatHasBeenRightIsToldFromOneThatNeverWas) {

@@ -93,6 +93,23 @@ TEST(ClippedEllipse, AgreesWithStripsAndCountsOnlyWhatIsLeft) {
   }
 }
 
+TEST(ClippedEllipse, OfAGaussianMuchNarrowerThanTheEllipseAgreesWithStrips) {
+  std::mt19937 random(17);
+  std::uniform_real_distribution<double> u(0.0, 200.0), v(0.0, 150.0);
+  PixelBox box;
+  box.min_u = 0, box.max_u = 200, box.min_v = 0, box.max_v = 150;
+  int partly = 0;
+  for (int n = 0; n < 200; ++n) {
+    const SearchEllipse ellipse{{u(random), v(random)}, randomCovariance(random, 20, 60)};
+    const Eigen::Matrix2d covariance = randomCovariance(random, 0.6, 12);
+    const Eigen::Vector2d mean(u(random), v(random));
+    const double mass = ClippedEllipse(ellipse, box).mass(mean, covariance);
+    EXPECT_NEAR(plainMass(ellipse, box, mean, covariance), mass, 2e-6) << n;
+    partly += mass > 0.01 && mass < 0.99;
+  }
+  EXPECT_GT(partly, 20);
+}
+
 TEST(ClippedEllipse, EqualsTheWholeEllipseInABigBoxAndNothingOutside) {
   PixelBox box;
   box.min_u = box.min_v = 0, box.max_u = box.max_v = 1000;
