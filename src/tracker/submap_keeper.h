@@ -112,6 +112,10 @@ class SubmapKeeper {
   static constexpr int kSlack = 30;
 
  private:
+  /// Separators that go to the trunk or come back together at least. Cost: each time is a
+  /// factorisation of the map's covariance.
+  static constexpr std::size_t kLeastSeparators = 4;
+
   void exchange(double stamp_s, Ekf* filter, FeatureMap* map);
   bool isResting(FeatureId id, double stamp_s) const;
   std::vector<FeatureId> candidates(double stamp_s, const Ekf& filter, const FeatureMap& map) const;
