@@ -1,11 +1,9 @@
 #include "active_matching_slam/image/image_motion.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-
-#include "correlation_alignment.h"
+#include <opencv2/video/tracking.hpp>
 
 namespace active_matching_slam {
 namespace {
@@ -58,12 +56,21 @@ double align(const Copies& copies, ImageMotion* motion) {
   // A pixel centre x is at scale x + offset in the copies.
   const Eigen::Vector2d offset = Eigen::Vector2d::Constant(0.5 * (scale - 1.0));
   const Eigen::Vector2d start = scale * motion->shift_px + offset - motion->turn * offset;
-  RigidWarp warp{std::atan2(motion->turn(1, 0), motion->turn(0, 0)), start.x(), start.y()};
-  const double correlation =
-      alignByCorrelation(copies.previous, copies.now, copies.used, {kMostSteps, kSmallGain}, &warp);
+  cv::Mat warp = (cv::Mat_<float>(2, 3) << motion->turn(0, 0), motion->turn(0, 1), start.x(),
+                  motion->turn(1, 0), motion->turn(1, 1), start.y());
+  double correlation = 0.0;
+  try {
+    correlation = cv::findTransformECC(
+        copies.previous, copies.now, warp, cv::MOTION_EUCLIDEAN,
+        cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kMostSteps, kSmallGain),
+        copies.used.empty() ? cv::InputArray(cv::noArray()) : cv::InputArray(copies.used), 1);
+  } catch (const cv::Exception&) {  // OpenCV's way of saying that it did not converge
+    return 0.0;
+  }
   if (!(correlation > 0.0)) return 0.0;
-  motion->turn = Eigen::Rotation2Dd(warp.angle_rad).toRotationMatrix();
-  const Eigen::Vector2d shift(warp.u, warp.v);
+  motion->turn << warp.at<float>(0, 0), warp.at<float>(0, 1), warp.at<float>(1, 0),
+      warp.at<float>(1, 1);
+  const Eigen::Vector2d shift(warp.at<float>(0, 2), warp.at<float>(1, 2));
   motion->shift_px = (shift - offset + motion->turn * offset) / scale;
   return correlation;
 }

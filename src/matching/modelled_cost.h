@@ -3,9 +3,8 @@
 namespace active_matching_slam {
 
 // Modelled time of the parts of a matching [ms], on one core of about 3 GHz. What takes more than
-// one part in a hundred of some frame has one. Cost: fitted to the measured times of whole
-// matchings of recorded images by their counts (correlation 0.99); `matching_benchmark` prints
-// how the sum compares with the time of its own.
+// one part in a hundred of some frame has one. Cost: fitted to the measured times of some thousand
+// matchings of recorded images by their counts (correlation 0.99).
 
 /// Of a row of a searched ellipse, and of a match found in it, next to modelledSearch_ms().
 constexpr double kEllipseRowMs = 3.5e-4, kMatchMs = 4.5e-3;

@@ -35,7 +35,7 @@ double expectedMatches(const FrameState& frame) {
 
 /// Modelled time of following the features from image to image, of an image of a million pixels,
 /// and of aligning two images [ms]. Cost: medians on one core of about 3 GHz.
-constexpr double kFlowMs = 6.0, kAlignmentMs = 4.0;
+constexpr double kFlowMs = 6.0, kAlignmentMs = 3.0;
 
 /// How the image moved since the reference image, which is the same whatever the prior.
 class ImageGuide {
