@@ -13,21 +13,21 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr int kFeatures = 14;  // as in figure 4.5
+constexpr int kValuedFeatures = 14;  // as in figure 4.5
 
-double meanOf(const std::vector<double>& values) {
+double meanValue(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 double covarianceOf(const std::vector<double>& x, const std::vector<double>& y) {
-  const double mx = meanOf(x), my = meanOf(y);
+  const double mx = meanValue(x), my = meanValue(y);
   double sum = 0.0;
   for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - mx) * (y[i] - my);
   return sum / static_cast<double>(x.size());
 }
 
 double spreadOf(const std::vector<double>& values) {
-  return std::sqrt(covarianceOf(values, values)) / meanOf(values);
+  return std::sqrt(covarianceOf(values, values)) / meanValue(values);
 }
 
 /// Of one frame's prediction.
@@ -112,8 +112,8 @@ ExperimentResult runInformationValues(Workbench& bench) {
     options.problems = bench.quick() ? 4 : 8;
     const Recording& recording = bench.recording(name, options);
     for (std::size_t p = 0; p < recording.problems.size(); ++p) {
-      const RecordedProblem problem = spreadFeatures(recording.problems[p], kFeatures);
-      if (problem.prior.size() < kFeatures) continue;
+      const RecordedProblem problem = spreadFeatures(recording.problems[p], kValuedFeatures);
+      if (problem.prior.size() < kValuedFeatures) continue;
       const Values v = valuesOf(problem.prior);
       const auto most = static_cast<std::size_t>(v.most), least = static_cast<std::size_t>(v.least);
       ++frames;
@@ -127,7 +127,7 @@ ExperimentResult runInformationValues(Workbench& bench) {
       spread_features.push_back(spreadOf(v.bits));
       spread_pairs.push_back(spreadOf(of_most));
       pairs_vary_more += spread_pairs.back() > spread_features.back();
-      for (int f = 0; f < kFeatures; ++f) {
+      for (int f = 0; f < kValuedFeatures; ++f) {
         const auto slot = static_cast<std::size_t>(f);
         const std::vector<double> pairs = v.pairsOf(f);
         const double sum = std::accumulate(pairs.begin(), pairs.end(), 0.0);
@@ -148,7 +148,7 @@ ExperimentResult runInformationValues(Workbench& bench) {
   result.tables.emplace_back("", table);
   if (frames == 0) return result;
   const auto areaLeft = [](const std::vector<double>& bits) {
-    return 100.0 * std::exp2(-meanOf(bits));
+    return 100.0 * std::exp2(-meanValue(bits));
   };
   result.findings.push_back(
       {"area of the other ellipses, once the feature with most, with least MI is measured",
@@ -158,17 +158,18 @@ ExperimentResult runInformationValues(Workbench& bench) {
        verdict(most_wins == frames)});
   result.findings.push_back(
       {"correlation of a feature's MI with the bits by which the other ellipses shrink",
-       "MI is the total reduction of uncertainty", text("%.2f", meanOf(correlations))});
+       "MI is the total reduction of uncertainty", text("%.2f", meanValue(correlations))});
   result.findings.push_back(
       {"spread (deviation over mean) of features' MI, and of a feature's MI with each other",
        "the former do not vary much, the latter pick up subtle differences",
-       text("%.2f, %.2f; more in %d of %d frames", meanOf(spread_features), meanOf(spread_pairs),
-            pairs_vary_more, frames),
+       text("%.2f, %.2f; more in %d of %d frames", meanValue(spread_features),
+            meanValue(spread_pairs), pairs_vary_more, frames),
        verdict(pairs_vary_more == frames)});
   result.findings.push_back(
       {"sum of a feature's pairwise MI over its MI with all others",
        "not the same: what it tells to one overlaps with what it tells to another",
-       text("%.2f; more than 1 for %d of %zu features", meanOf(ratios), overlapping, ratios.size()),
+       text("%.2f; more than 1 for %d of %zu features", meanValue(ratios), overlapping,
+            ratios.size()),
        verdict(overlapping > 0.9 * static_cast<double>(ratios.size()))});
   return result;
 }

@@ -12,10 +12,10 @@
 namespace active_matching_slam {
 namespace {
 
-constexpr double kNoisePx = 1.0;
+constexpr double kKeyframeNoisePx = 1.0;
 
 /// What a tracker on keyframes knows before an image.
-struct Moment {
+struct Keyframe {
   int image = 0;
   Eigen::Isometry3d T_world_camera;  ///< predicted with constant velocity from the two poses before
   double interval_s = 0.0;
@@ -45,7 +45,7 @@ Eigen::Matrix<double, 6, 6> relativeCovariance(const Sequence& sequence, double 
   return sigma.cwiseAbs2().asDiagonal();
 }
 
-RecordedProblem problemOf(const Sequence& sequence, const Moment& moment,
+RecordedProblem problemOf(const Sequence& sequence, const Keyframe& moment,
                           const std::map<FeatureId, Eigen::Vector3d>& map, const TruePlaces& truth,
                           double border_px) {
   RecordedProblem problem;
@@ -75,7 +75,7 @@ RecordedProblem problemOf(const Sequence& sequence, const Moment& moment,
     problem.prior.z.segment<2>(2 * i) = places[static_cast<std::size_t>(i)];
     J.middleRows<2>(2 * i) = jacobians[static_cast<std::size_t>(i)];
   }
-  problem.prior.noise_variance_px2 = kNoisePx * kNoisePx;
+  problem.prior.noise_variance_px2 = kKeyframeNoisePx * kKeyframeNoisePx;
   problem.prior.S = J * relativeCovariance(sequence, moment.interval_s) * J.transpose();
   problem.prior.S.diagonal().array() += problem.prior.noise_variance_px2;
   return problem;
@@ -85,7 +85,7 @@ RecordedProblem problemOf(const Sequence& sequence, const Moment& moment,
 std::vector<RecordedProblem> keyframeProblems(Workbench& bench, const Sequence& sequence,
                                               int every) {
   const TrackerOptions options = referenceOptions(sequence, bench.quick() ? 30 : 60);
-  std::vector<Moment> moments;
+  std::vector<Keyframe> moments;
   std::map<FeatureId, Eigen::Vector3d> map;
   std::vector<StampedPose> poses;
   TruePlaces truth(sequence);

@@ -8,11 +8,11 @@
 namespace active_matching_slam {
 namespace {
 
-struct ThesisRow {
+struct ThesisTimes {
   const char* matcher;
   const char* milliseconds;  ///< correlation / MI / update / tree / total
 };
-constexpr ThesisRow kThesis[] = {
+constexpr ThesisTimes kThesisTimes[] = {
     {"jcbb", "136.2 / - / 23787 / - / 23.9 s"},
     {"active", "19.7 / 22531 / 2653 / - / 25.2 s"},
     {"fast_active", "83.1 / 2.5 / 15.6 / - / 101.2"},
@@ -81,7 +81,7 @@ ExperimentResult runScalableMatching(Workbench& bench) {
   result.findings.push_back({text("pixels JCBB : AM, %d features", most),
                              "the gap widens as the rate falls", byRateText(bench, gap, "%.1f"),
                              verdict(isRising(gap))});
-  for (const ThesisRow& row : kThesis)
+  for (const ThesisTimes& row : kThesisTimes)
     if (const auto* cell = bench.cell(bench.mainSequence(), 30.0, most, row.matcher)) {
       const TrialSummary& s = cell->summary;
       result.findings.push_back(

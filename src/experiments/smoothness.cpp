@@ -8,7 +8,7 @@
 namespace active_matching_slam {
 namespace {
 
-struct Run {
+struct JitterRun {
   int frames = 0, tracked = 0;
   Trajectory trajectory;  ///< as the truth, after Sim(3) alignment
   double step_error_mm = 0.0;
@@ -31,8 +31,8 @@ double secondDifference(const std::vector<PosePair>& pairs, const Alignment& ali
   return std::sqrt(squares / std::max(1, count));
 }
 
-Run runWith(const Sequence& sequence, int features) {
-  Run run;
+JitterRun runWith(const Sequence& sequence, int features) {
+  JitterRun run;
   trackSequence(sequence, referenceOptions(sequence, features), 1,
                 [&](const TrackedFrame& frame, int) {
                   ++run.frames;
@@ -64,7 +64,7 @@ ExperimentResult runSmoothness(Workbench& bench) {
   std::string here;
   for (const int features : counts) {
     bench.say(text("trajectory along a corridor with %d features", features));
-    const Run run = runWith(sequence, features);
+    const JitterRun run = runWith(sequence, features);
     table.add({features, run.frames, run.tracked, run.jitter_mm, run.step_error_mm});
     ChartSeries series{text("%d features", features), {}};
     for (const StampedPose& pose : run.trajectory)

@@ -78,12 +78,12 @@ Links measurementLinks(const MeasurementPrior& prior) {
   return links;
 }
 
-struct Moments {
+struct SpaceMoments {
   double mean = 0.0, deviation = 0.0;
   int count = 0;
 };
-Moments momentsOf(const Links& links) {
-  Moments m;
+SpaceMoments momentsOf(const Links& links) {
+  SpaceMoments m;
   double squares = 0.0;
   for (const auto& [pair, bits] : links) {
     m.mean += bits;
@@ -131,7 +131,7 @@ ExperimentResult runStateSpace(Workbench& bench) {
   ExperimentResult result;
   const int images = static_cast<int>(sequence.images.size());
   const int early = std::min(60, images / 2);  // as in the figure
-  Moments state[2], measurement[2];
+  SpaceMoments state[2], measurement[2];
   Tracker tracker(sequence.camera, referenceOptions(sequence, bench.quick() ? 20 : 30));
   std::vector<cv::Mat> panels;
   for (int i = 0; i < images; ++i) {
@@ -145,7 +145,7 @@ ExperimentResult runStateSpace(Workbench& bench) {
     measurement[when] = momentsOf(of_measurements);
     panels.push_back(drawLinks(*frame, of_state, text("image %d, state", i)));
     panels.push_back(drawLinks(*frame, of_measurements, text("image %d, measurements", i)));
-    for (const auto& [space, m] : {std::pair<const char*, Moments>{"state", state[when]},
+    for (const auto& [space, m] : {std::pair<const char*, SpaceMoments>{"state", state[when]},
                                    {"measurements", measurement[when]}})
       table.add({i, space, m.count, m.mean, m.deviation});
   }
@@ -158,7 +158,9 @@ ExperimentResult runStateSpace(Workbench& bench) {
        "two orders of magnitude larger in that of the state",
        text("%.2f, %.2f bits", state[1].mean, measurement[1].mean),
        verdict(state[1].mean > 10.0 * measurement[1].mean)});
-  const auto growth = [](const Moments& from, const Moments& to) { return to.mean / from.mean; };
+  const auto growth = [](const SpaceMoments& from, const SpaceMoments& to) {
+    return to.mean / from.mean;
+  };
   const double of_state = growth(state[0], state[1]),
                of_measurements = growth(measurement[0], measurement[1]);
   result.findings.push_back(
