@@ -66,7 +66,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
     moved = features_;
     applyError(start, from, moved);
   }
-  const std::vector<FeatureState>& believed = is_started ? moved : features_;
+  const std::vector<FeatureState>& start_features = is_started ? moved : features_;
   const CameraModel lens = camera.corrected(from.lens);
   std::vector<UsableMeasurement> usable;
   std::vector<std::size_t> given;  // places of those in `measurements`
@@ -78,7 +78,7 @@ UpdateReport Ekf::update(const CameraModel& camera,
     if (index < 0 || !m.pixel.allFinite() || !std::isfinite(m.sigma_px) ||
         !m.noise_shape.allFinite())
       continue;
-    if (!projectFeature(lens, from, believed[index])) continue;
+    if (!projectFeature(lens, from, start_features[index])) continue;
     const double sigma_px = m.sigma_px > 0.0 ? m.sigma_px : options_.sigma_px;
     usable.push_back(
         {index, m.pixel, sigma_px * sigma_px, std::max(1.0, m.variance_inflation), m.noise_shape});

@@ -1,16 +1,10 @@
 #include <cmath>
 
 #include "active_matching_slam/tracker/ground_plane.h"
+#include "scale_acceptance.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
-namespace {
-
-/// Relative standard deviation up to which a scale is taken. Derivation: what is left of its error
-/// is followed to first order; half its square is 0.5 %.
-constexpr double kLargestGroundScaleSigma = 0.1;
-
-}  // namespace
 
 /// All that the map has around the camera.
 std::vector<PointBelow> Tracker::Implementation::pointsAround() const {
@@ -46,7 +40,7 @@ void Tracker::Implementation::scaleByGround(TrackedFrame* frame) {
     if (const auto& T_base_camera = motion_history_->camera())
       down_camera = -T_base_camera->linear().row(2).transpose();
   const auto ground = findGround(pointsAround(), down_camera, options_.ground);
-  if (!ground || ground->relative_sigma > kLargestGroundScaleSigma) return;
+  if (!ground || ground->relative_sigma > kLargestScaleSigma) return;
   becomeMetric(options_.ground.camera_height_m / ground->height, ground->relative_sigma,
                ScaleSource::kCameraHeight, frame);
 }

@@ -5,6 +5,7 @@
 #include "active_matching_slam/filter/scale_from_distances.h"
 #include "active_matching_slam/image/warp.h"
 #include "active_matching_slam/math/chi_square.h"
+#include "scale_acceptance.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
@@ -12,9 +13,6 @@ namespace {
 
 /// Every how many frames a target is looked for. Cost: its detection takes as long as a frame.
 constexpr int kDetectionPeriodFrames = 5;
-/// Relative standard deviation up to which a scale is taken. Derivation: the logarithm of a
-/// distance is taken to first order; what that leaves out is half the square, 0.5 %.
-constexpr double kLargestScaleSigma = 0.1;
 /// Confidence up to which the corners have the target's shape. Cost: of a thousand sound sightings
 /// one is begun anew.
 constexpr double kShapeConfidence = 0.999;
