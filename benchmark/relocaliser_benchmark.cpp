@@ -60,10 +60,16 @@ void look(benchmark::State& state, const std::string& scene) {
 }
 
 BENCHMARK_CAPTURE(look, found, "room")
-    ->ArgsProduct({{320, 640}, {40, 100}})
+    ->Args({320, 40})
+    ->Args({640, 40})
+    ->Args({320, 100})
+    ->Args({640, 100})
     ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(look, elsewhere, "office")
-    ->ArgsProduct({{320, 640}, {40, 100}})
+    ->Args({320, 40})
+    ->Args({640, 40})
+    ->Args({320, 100})
+    ->Args({640, 100})
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -49,10 +49,11 @@ void checkAndName(const std::string& path, CameraCalibration* calibration,
   }
 }
 
-/// The camchain of Kalibr.
-CameraCalibration parseKalibr(const std::string& path, const YAML::Node& camera) {
+/// One camera of Kalibr's camchain, or the whole of EuRoC's sensor.yaml.
+CameraCalibration parseKalibr(const std::string& path, const YAML::Node& camera,
+                              const std::string& name) {
   CameraCalibration calibration;
-  calibration.name = "cam0";
+  calibration.name = name;
   const auto kind = readField<std::string>(path, camera, "camera_model");
   if (kind != "pinhole")
     fail(path, "Kalibr's camera_model is '" + kind + "', must be pinhole: calibrate for that");
@@ -68,8 +69,53 @@ CameraCalibration parseKalibr(const std::string& path, const YAML::Node& camera)
   calibration.cy = K[3];
   const auto model = readField<std::string>(path, camera, "distortion_model");
   std::vector<double> D;
-  if (model != "none") D = readField<std::vector<double>>(path, camera, "distortion_coeffs");
-  checkAndName(path, &calibration, model == "radtan" ? "plumb_bob" : model, std::move(D));
+  const std::string coefficients =
+      camera["distortion_coefficients"] ? "distortion_coefficients" : "distortion_coeffs";
+  if (model != "none") D = readField<std::vector<double>>(path, camera, coefficients);
+  const bool is_radial_tangential = model == "radtan" || model == "radial-tangential";
+  checkAndName(path, &calibration, is_radial_tangential ? "plumb_bob" : model, std::move(D));
+  return calibration;
+}
+
+/// Kalibr's cam0; where there is none, the first that there is. Empty: the file is not Kalibr's.
+std::string cameraOfKalibr(const YAML::Node& root) {
+  std::string first;
+  for (const auto& entry : root) {
+    if (!entry.first.IsScalar() || !entry.second.IsMap()) continue;
+    const auto name = entry.first.as<std::string>();
+    if (name == "cam0" ||
+        (first.empty() && name.rfind("cam", 0) == 0 && entry.second["intrinsics"]))
+      first = name == "cam0" || first.empty() ? name : first;
+  }
+  return first;
+}
+
+/// VINS and others, by camodocal.
+CameraCalibration parseCamodocal(const std::string& path, const YAML::Node& root) {
+  const auto kind = readField<std::string>(path, root, "model_type");
+  const bool fisheye = kind == "KANNALA_BRANDT";
+  if (kind != "PINHOLE" && !fisheye)
+    fail(path, "camodocal's model_type is '" + kind + "', must be PINHOLE or KANNALA_BRANDT");
+  CameraCalibration calibration;
+  calibration.name = "camera";
+  calibration.width = readField<int>(path, root, "image_width");
+  calibration.height = readField<int>(path, root, "image_height");
+  const auto read = [&](const char* const group, const char* const name) {
+    if (!root[group]) fail(path, "field '" + std::string(group) + "' is missing");
+    return readField<double>(path, root[group], name);
+  };
+  const char* const projection = "projection_parameters";
+  calibration.fx = read(projection, fisheye ? "mu" : "fx");
+  calibration.fy = read(projection, fisheye ? "mv" : "fy");
+  calibration.cx = read(projection, fisheye ? "u0" : "cx");
+  calibration.cy = read(projection, fisheye ? "v0" : "cy");
+  std::vector<double> D;
+  if (fisheye)
+    for (const char* const name : {"k2", "k3", "k4", "k5"}) D.push_back(read(projection, name));
+  else
+    for (const char* const name : {"k1", "k2", "p1", "p2"})
+      D.push_back(read("distortion_parameters", name));
+  checkAndName(path, &calibration, fisheye ? "equidistant" : "plumb_bob", std::move(D));
   return calibration;
 }
 
@@ -97,59 +143,80 @@ CameraCalibration parseOrbSlam(const std::string& path, const YAML::Node& root,
   return calibration;
 }
 
-void readProjection(const std::string& path, const YAML::Node& root,
-                    CameraCalibration* calibration) {
-  const std::vector<double> P = readMatrix(path, root, "projection_matrix");
+void setProjection(const std::string& path, const std::string& field, const std::vector<double>& P,
+                   CameraCalibration* calibration) {
   if (P.size() != 12)
-    fail(path,
-         "field 'projection_matrix.data' has " + std::to_string(P.size()) + " numbers, must be 12");
+    fail(path, "field '" + field + "' has " + std::to_string(P.size()) + " numbers, must be 12");
   calibration->fx = P[0];
   calibration->fy = P[5];
   calibration->cx = P[2];
   calibration->cy = P[6];
 }
 
-void readIntrinsics(const std::string& path, const YAML::Node& root,
-                    CameraCalibration* calibration) {
-  const std::vector<double> K = readMatrix(path, root, "camera_matrix");
+void setIntrinsics(const std::string& path, const std::string& field, const std::vector<double>& K,
+                   CameraCalibration* calibration) {
   if (K.size() != 9)
-    fail(path,
-         "field 'camera_matrix.data' has " + std::to_string(K.size()) + " numbers, must be 9");
+    fail(path, "field '" + field + "' has " + std::to_string(K.size()) + " numbers, must be 9");
   if (K[1] != 0.0 || K[3] != 0.0 || K[6] != 0.0 || K[7] != 0.0 || K[8] != 1.0)
-    fail(path, "field 'camera_matrix.data' must be [fx, 0, cx, 0, fy, cy, 0, 0, 1]");
+    fail(path, "field '" + field + "' must be [fx, 0, cx, 0, fy, cy, 0, 0, 1]");
   calibration->fx = K[0];
   calibration->fy = K[4];
   calibration->cx = K[2];
   calibration->cy = K[5];
 }
 
-CameraCalibration parse(const std::string& path, const YAML::Node& root, bool rectified) {
-  if (!root.IsMap()) fail(path, "not a camera_info yaml file (no fields)");
-  const bool kalibr = root["cam0"] && root["cam0"].IsMap();
-  const std::string orb_slam =
-      root["Camera.fx"] ? "Camera." : (root["Camera1.fx"] ? "Camera1." : "");
-  if (rectified && (kalibr || !orb_slam.empty()))
-    fail(path, "is of raw images, but these are rectified: give the raw ones");
-  if (kalibr) return parseKalibr(path, root["cam0"]);
-  if (!orb_slam.empty()) return parseOrbSlam(path, root, orb_slam);
+/// A camera_info message, as 'rostopic echo' prints it.
+CameraCalibration parseMessage(const std::string& path, const YAML::Node& root, bool rectified) {
   CameraCalibration calibration;
-  if (root["camera_name"]) calibration.name = readField<std::string>(path, root, "camera_name");
-  calibration.width = readField<int>(path, root, "image_width");
-  calibration.height = readField<int>(path, root, "image_height");
+  calibration.width = readField<int>(path, root, "width");
+  calibration.height = readField<int>(path, root, "height");
   if (rectified) {
-    readProjection(path, root, &calibration);
+    setProjection(path, "P", readField<std::vector<double>>(path, root, "P"), &calibration);
     checkAndName(path, &calibration, "none", {});
-    return calibration;
+  } else {
+    setIntrinsics(path, "K", readField<std::vector<double>>(path, root, "K"), &calibration);
+    checkAndName(path, &calibration, readField<std::string>(path, root, "distortion_model"),
+                 readField<std::vector<double>>(path, root, "D"));
   }
-  readIntrinsics(path, root, &calibration);
-  // Files older than the field mean plumb_bob (camera_calibration_parsers), or say 'fisheye' in
-  // another.
+  const auto part = [&](const YAML::Node& parent, const char* const field) {
+    return parent && parent[field] ? readField<int>(path, parent, field) : 0;
+  };
+  const YAML::Node roi = root["roi"];
+  try {
+    return cropAndBin(calibration, part(roi, "x_offset"), part(roi, "y_offset"), part(roi, "width"),
+                      part(roi, "height"), part(root, "binning_x"), part(root, "binning_y"));
+  } catch (const std::invalid_argument& error) {
+    fail(path, error.what());
+  }
+}
+
+/// Older files than the field mean plumb_bob (camera_calibration_parsers), or say 'fisheye' in
+/// another; OpenCV's own calibrator says it by a flag.
+std::string distortionModelOf(const std::string& path, const YAML::Node& root) {
   std::string model = "plumb_bob";
+  if (root["fisheye_model"] && readField<int>(path, root, "fisheye_model") != 0) model = "fisheye";
   for (const char* const field : {"camera_model", "distortion_model"}) {
     if (!root[field]) continue;
     const auto name = readField<std::string>(path, root, field);
     if (name != "pinhole") model = name;
   }
+  return model;
+}
+
+/// A file of camera_calibration, or of OpenCV.
+CameraCalibration parseCameraInfo(const std::string& path, const YAML::Node& root, bool rectified) {
+  CameraCalibration calibration;
+  if (root["camera_name"]) calibration.name = readField<std::string>(path, root, "camera_name");
+  calibration.width = readField<int>(path, root, "image_width");
+  calibration.height = readField<int>(path, root, "image_height");
+  if (rectified) {
+    setProjection(path, "projection_matrix.data", readMatrix(path, root, "projection_matrix"),
+                  &calibration);
+    checkAndName(path, &calibration, "none", {});
+    return calibration;
+  }
+  setIntrinsics(path, "camera_matrix.data", readMatrix(path, root, "camera_matrix"), &calibration);
+  const std::string model = distortionModelOf(path, root);
   std::vector<double> D;
   try {
     if (distortionModelFromName(model) != DistortionModel::kNone || root["distortion_coefficients"])
@@ -161,12 +228,44 @@ CameraCalibration parse(const std::string& path, const YAML::Node& root, bool re
   return calibration;
 }
 
+[[noreturn]] void failForeign(const std::string& path, const YAML::Node& root) {
+  std::string fields;
+  if (root.IsMap())
+    for (const auto& entry : root)
+      if (entry.first.IsScalar()) fields += (fields.empty() ? "" : ", ") + entry.first.Scalar();
+  fail(path,
+       "not the calibration of a camera in a form that is read, which are yaml files of "
+       "camera_calibration (its ost.yaml), OpenCV, Kalibr, EuRoC, VINS and ORB-SLAM, and a "
+       "camera_info message; " +
+           (fields.empty() ? "it has no fields" : "its fields are " + fields));
+}
+
+CameraCalibration parse(const std::string& path, const YAML::Node& root, bool rectified) {
+  if (!root.IsMap()) failForeign(path, root);
+  const std::string kalibr = cameraOfKalibr(root);
+  const bool is_euroc = root["intrinsics"] && root["resolution"];
+  const bool is_camodocal = static_cast<bool>(root["model_type"]);
+  const std::string orb_slam =
+      root["Camera.fx"] ? "Camera." : (root["Camera1.fx"] ? "Camera1." : "");
+  if (rectified && (!kalibr.empty() || is_euroc || is_camodocal || !orb_slam.empty()))
+    fail(path, "is of raw images, but these are rectified: give the raw ones");
+  if (!kalibr.empty()) return parseKalibr(path, root[kalibr], kalibr);
+  if (is_euroc) return parseKalibr(path, root, "camera");
+  if (is_camodocal) return parseCamodocal(path, root);
+  if (!orb_slam.empty()) return parseOrbSlam(path, root, orb_slam);
+  if (root["K"] && root["width"]) return parseMessage(path, root, rectified);
+  if (!root["image_width"] && !root["camera_matrix"]) failForeign(path, root);
+  return parseCameraInfo(path, root, rectified);
+}
+
 }  // namespace
 
 CameraCalibration readCalibrationYaml(const std::string& path, bool rectified) {
   std::ifstream file(path);
   std::stringstream text;
-  if (!file || !(text << file.rdbuf())) fail(path, "cannot be read");
+  if (!file) fail(path, "cannot be read");
+  if (file.peek() == std::ifstream::traits_type::eof()) fail(path, "is empty, or cannot be read");
+  text << file.rdbuf();
   std::string content = text.str();
   // OpenCV's own first line is no yaml.
   if (content.rfind("%YAML:", 0) == 0) content.erase(0, content.find('\n'));

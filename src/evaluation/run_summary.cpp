@@ -104,6 +104,18 @@ void summariseErrors(const std::vector<FrameRecord>& records, const RunTruth& tr
   summary->nees_fraction_within = fractionWithin(nees, chiSquareMeanBounds(6, 1));
 }
 
+/// The text that occurs most often; of as frequent ones the first by the alphabet.
+std::string mostFrequent(const std::map<std::string, int>& texts) {
+  int most = 0;
+  std::string found;
+  for (const auto& [text, times] : texts) {
+    if (times <= most) continue;
+    most = times;
+    found = text;
+  }
+  return found;
+}
+
 void summariseMotion(const std::vector<FrameRecord>& records, RunSummary* summary) {
   std::map<std::string, int> faults;
   for (const FrameRecord& record : records) {
@@ -113,22 +125,20 @@ void summariseMotion(const std::vector<FrameRecord>& records, RunSummary* summar
     if (!is_told && is_faulty) ++summary->frames_without_motion;
     if (!is_told && is_faulty) ++faults[record.motion_fault];
   }
-  int most = 0;
-  for (const auto& [fault, frames] : faults) {
-    if (frames <= most) continue;
-    most = frames;
-    summary->motion_fault = fault;
-  }
+  summary->motion_fault = mostFrequent(faults);
 }
 
 void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summary) {
   double matched = 0.0, candidates = 0.0;
+  std::map<std::string, int> untracked;
   for (const FrameRecord& record : records) {
     const MatchStatistics& matching = record.matching;
     if (record.isTracked()) {
       ++summary->frames_tracked;
       matched += matching.matched;
       candidates += matching.candidates;
+    } else if (!record.reason.empty()) {
+      ++untracked[record.reason];
     }
     if (!matching.matcher.empty()) summary->matcher = matching.matcher;
     summary->pixels_searched += matching.pixels_searched;
@@ -152,6 +162,7 @@ void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summ
     summary->late_images = std::max(summary->late_images, record.late_images);
     if (!record.reason.empty()) summary->last_reason = record.reason;
   }
+  summary->untracked_reason = mostFrequent(untracked);
   std::set<int> maps;
   std::vector<double> qualities;
   std::map<std::string, int> causes;
@@ -165,12 +176,7 @@ void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summ
   }
   summary->maps = static_cast<int>(maps.size());
   if (!qualities.empty()) summary->quality = percentile(std::move(qualities), 0.5);
-  int most = 0;
-  for (const auto& [cause, frames] : causes) {
-    if (frames <= most) continue;
-    most = frames;
-    summary->quality_reason = cause;
-  }
+  summary->quality_reason = mostFrequent(causes);
   if (summary->frames_tracked > 0) {
     summary->matched_mean = matched / summary->frames_tracked;
     summary->candidates_mean = candidates / summary->frames_tracked;
@@ -252,6 +258,7 @@ RunSummary summarise(const std::vector<FrameRecord>& records, const RunTruth& tr
   const std::size_t stages = namedDurations(records.front()).size();
   std::vector<std::vector<double>> values(stages);
   for (const FrameRecord& record : records) {
+    if (record.ignored_image) continue;
     const auto durations = namedDurations(record);
     for (std::size_t stage = 0; stage < stages; ++stage)
       values[stage].push_back(durations[stage].second);

@@ -5,7 +5,12 @@
 namespace active_matching_slam {
 namespace {
 
+// Keys in the order below, where the library can (3.9); else by the alphabet.
+#if NLOHMANN_JSON_VERSION_MAJOR > 3 || NLOHMANN_JSON_VERSION_MINOR >= 9
 using Json = nlohmann::ordered_json;
+#else
+using Json = nlohmann::json;
+#endif
 
 Json orNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
@@ -23,6 +28,7 @@ std::string summaryJson(const RunSummary& s) {
   json["quality"] = s.quality;
   json["quality_reason"] = s.quality_reason;
   json["late_images"] = s.late_images;
+  json["untracked_reason"] = s.untracked_reason;
   json["duration_s"] = s.duration_s;
   json["matcher"] = s.matcher.empty() ? Json(nullptr) : Json(s.matcher);
   json["scale_source"] = scaleSourceName(s.scale_source);

@@ -91,8 +91,11 @@ CameraSubscription::CameraSubscription(const ros::NodeHandle& private_node,
       image_topic_(base_topic_),
       info_topic_(infoTopicOf(private_node, image_topic_)),
       image_transport_(private_node),
-      info_(readCameraInfo(private_node, camera_info_url, isRectifiedTopic(image_topic_))),
-      last_image_(ros::WallTime::now()) {}
+      last_image_(ros::WallTime::now()) {
+  if (const auto info =
+          readCameraInfo(private_node, camera_info_url, isRectifiedTopic(image_topic_)))
+    calibration_.take(info, last_image_.toSec());
+}
 
 void CameraSubscription::start(const std::string& transport, Callback callback) {
   callback_ = std::move(callback);
@@ -143,7 +146,7 @@ void CameraSubscription::deliver(CameraImage image) {
   ++received_;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    image.info = info_;
+    image.info = calibration_.inUse();
     last_image_ = image.received;
     if (first_image_.isZero()) first_image_ = image.received;
   }
@@ -152,8 +155,15 @@ void CameraSubscription::deliver(CameraImage image) {
 
 void CameraSubscription::onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  // The same pointer for the same calibration: a comparison of pointers then detects a change.
-  if (!info_ || !sameCalibration(*info_, *info)) info_ = info;
+  if (calibration_.take(info, ros::WallTime::now().toSec())) return;
+  const auto text = [](const sensor_msgs::CameraInfo& of) {
+    std::ostringstream stream;
+    stream << of.width << "x" << of.height << " with fx " << of.K[0] << " px";
+    return stream.str();
+  };
+  calibrations_warning_.say("by turns", "two calibrations by turns on " + info_topic_ +
+                                            ": used is that of " + text(*calibration_.inUse()) +
+                                            ", not that of " + text(*info));
 }
 
 std::uint32_t CameraSubscription::publishers() const {
@@ -202,7 +212,8 @@ std::string CameraSubscription::silence() const {
       if (ros::Time::isSimTime() && ros::Time::now().isZero())
         text << "; use_sim_time is set, but there is no /clock";
     }
-  } else if (!info_ && !first_image_.isZero() && (now - first_image_).toSec() > kInfoDelay_s) {
+  } else if (!calibration_.inUse() && !first_image_.isZero() &&
+             (now - first_image_).toSec() > kInfoDelay_s) {
     text << "No camera_info on " << info_topic_ << " (remap camera_info, or set camera_info_url?)";
   }
   return text.str();

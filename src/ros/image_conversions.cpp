@@ -28,6 +28,17 @@ std::string colorEncoding(const std::string& encoding) {
   return encoding;
 }
 
+const char* const kReadable =
+    " (mono8, mono16, rgb, bgr, rgba, bgra, bayer and yuv422 of 8 or 16 bits are read)";
+
+/// Packed 4:2:2 with brightness first, as webcams send it: newer than versions of sensor_msgs, and
+/// without a conversion in cv_bridge.
+const char* const kYuyv = "yuv422_yuy2";
+
+/// What 12 bits hold. Standard: sensors have 10, 12 or 14 bits; read as 16, what has 12 or fewer
+/// is all but black.
+constexpr double kTwelveBits = 4096.0;
+
 std::string sizeName(std::uint64_t width, std::uint64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
@@ -36,12 +47,13 @@ std::string sizeName(std::uint64_t width, std::uint64_t height) {
 void checkLayout(const sensor_msgs::Image& message) {
   if (message.width == 0 || message.height == 0)
     throw std::runtime_error("image is empty: " + sizeName(message.width, message.height));
-  int bytes_per_pixel = 0;
+  int bytes_per_pixel = 2;
   try {
-    bytes_per_pixel =
-        encodings::numChannels(message.encoding) * encodings::bitDepth(message.encoding) / 8;
+    if (message.encoding != kYuyv)
+      bytes_per_pixel =
+          encodings::numChannels(message.encoding) * encodings::bitDepth(message.encoding) / 8;
   } catch (const std::exception&) {
-    throw std::runtime_error("image encoding '" + message.encoding + "' is unknown");
+    throw std::runtime_error("image encoding '" + message.encoding + "' is unknown" + kReadable);
   }
   const std::uint64_t row_bytes = std::uint64_t{message.width} * bytes_per_pixel;
   if (message.step < row_bytes)
@@ -68,6 +80,29 @@ void swapBytes(sensor_msgs::Image* message) {
     for (std::size_t i = 0; i + 1 < message->step; i += 2) std::swap(begin[i], begin[i + 1]);
   }
   message->is_bigendian = hostIsBigEndian();
+}
+
+cv::Mat brightnessOfYuyv(const sensor_msgs::Image& message) {
+  const cv::Mat pairs(static_cast<int>(message.height), static_cast<int>(message.width), CV_8UC2,
+                      const_cast<std::uint8_t*>(message.data.data()), message.step);
+  cv::Mat brightness;
+  cv::extractChannel(pairs, brightness, 0);
+  return brightness;
+}
+
+/// Refuses 16-bit values that a sensor of fewer bits gave as they were.
+void checkDepthIsUsed(const sensor_msgs::ImageConstPtr& image) {
+  const std::string& encoding = image->encoding;
+  if (encodings::bitDepth(encoding) != 16 ||
+      !(encodings::isMono(encoding) || encodings::isColor(encoding) ||
+        encodings::isBayer(encoding)))
+    return;
+  double most = 0.0;
+  cv::minMaxLoc(cv_bridge::toCvShare(image)->image.reshape(1), nullptr, &most);
+  if (most > 0.0 && most < kTwelveBits)
+    throw std::runtime_error("its largest value is " + std::to_string(static_cast<int>(most)) +
+                             " of 65535: if the sensor has 12 bits or fewer, let its driver scale "
+                             "them to 16, or send mono8");
 }
 
 std::vector<double> knownCoefficients(const sensor_msgs::CameraInfo& message,
@@ -100,6 +135,11 @@ std::vector<double> knownCoefficients(const sensor_msgs::CameraInfo& message,
 
 cv::Mat toGrayImage(const sensor_msgs::Image& message) {
   checkLayout(message);
+  if (message.encoding == kYuyv) return brightnessOfYuyv(message);
+  if (encodings::bitDepth(message.encoding) > 16 ||
+      (encodings::numChannels(message.encoding) == 2 && message.encoding != encodings::YUV422))
+    throw std::runtime_error("image with encoding '" + message.encoding + "' is no picture" +
+                             kReadable);
   try {
     sensor_msgs::ImageConstPtr source(&message, [](const sensor_msgs::Image*) {});
     const bool swapped =
@@ -111,6 +151,7 @@ cv::Mat toGrayImage(const sensor_msgs::Image& message) {
       if (swapped) swapBytes(changed.get());
       source = changed;
     }
+    checkDepthIsUsed(source);
     const cv::Mat gray = cv_bridge::toCvCopy(source, encodings::MONO8)->image;
     if (gray.type() != CV_8UC1) throw std::runtime_error("it has no conversion to grey");
     return gray;
@@ -121,6 +162,9 @@ cv::Mat toGrayImage(const sensor_msgs::Image& message) {
 }
 
 cv::Mat toGrayImage(const sensor_msgs::CompressedImage& message) {
+  if (message.format.find("compressedDepth") != std::string::npos)
+    throw std::runtime_error("compressed image with format '" + message.format +
+                             "' is of depths, no picture");
   cv::Mat gray;
   try {
     if (!message.data.empty()) gray = cv::imdecode(message.data, cv::IMREAD_GRAYSCALE);
@@ -129,7 +173,8 @@ cv::Mat toGrayImage(const sensor_msgs::CompressedImage& message) {
   }
   if (gray.empty())
     throw std::runtime_error("compressed image with format '" + message.format + "' and " +
-                             std::to_string(message.data.size()) + " bytes can't be decoded");
+                             std::to_string(message.data.size()) +
+                             " bytes can't be decoded (jpeg and png are read, no video)");
   return gray;
 }
 

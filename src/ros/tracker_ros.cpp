@@ -167,7 +167,8 @@ void TrackerRos::noticeChanges(const TrackedFrame& frame, const ros::Time& stamp
     else if (frame.resets == resets_ && session_.generation() == generation_)
       ROS_WARN_STREAM("The pose is in map " << frame.map << " from here on: " << frame.reason);
     else if (session_.generation() == generation_ && reset_cause_.empty())
-      restart_warning_.say("Started anew" + (frame.reason.empty() ? "" : ": " + frame.reason));
+      restart_warning_.say(std::string("Started anew") + (frame.reason.empty() ? "" : ": ") +
+                           frame.reason.substr(0, frame.reason.find(": started anew")));
     forgetPast(time_jumped);
   }
   generation_ = session_.generation();

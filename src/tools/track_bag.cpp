@@ -61,7 +61,8 @@ po::options_description describeOptions(Settings* s) {
   add("camera-info-topic", text(&s->camera_info_topic),
       "default: camera_info beside the image topic");
   add("camera-info", text(&s->camera_info),
-      "calibration yaml instead of a topic: of camera_calibration, Kalibr or ORB-SLAM");
+      "calibration yaml instead of a topic: of camera_calibration, OpenCV, Kalibr, EuRoC, VINS, "
+      "ORB-SLAM, or a camera_info message");
   add("accept-calibration", po::bool_switch(&s->accept_calibration),
       "go on with a calibration that can hardly be right");
   add("mask", text(&s->mask),
@@ -125,6 +126,8 @@ RunTruth truthOf(const Settings& settings, const Bags& bags) {
   truth.simulated = settings.simulated || bagHasTopic(bags, CameraBagWriter::kSimulationTopic);
   if (!settings.ground_truth.empty()) {
     truth.trajectory = readTrajectoryTum(settings.ground_truth);
+    if (truth.trajectory.empty())
+      throw std::runtime_error(settings.ground_truth + ": there is no pose in it");
     return truth;
   }
   truth.trajectory = readBagTrajectory(bags, settings.ground_truth_topic);
@@ -170,7 +173,22 @@ class AnnotatedVideo {
   cv::VideoWriter writer_;
 };
 
-void printSummary(const RunSummary& s, const std::string& scale_fault, const std::string& output) {
+/// What a summary line leaves unexplained.
+void printOmissions(const RunSummary& s, const RunTruth& truth, int images_without_stamp) {
+  const int untracked = s.frames - s.frames_tracked;
+  if (s.frames_tracked > 0 && !s.untracked_reason.empty())
+    std::printf("\n%d frames not tracked, most often: %s", untracked, s.untracked_reason.c_str());
+  if (images_without_stamp > 0)
+    std::printf("\n%d images have no stamp: the time of their recording was taken",
+                images_without_stamp);
+  if (s.frames_tracked > 0 && !truth.trajectory.empty() && s.truth_pairs == 0)
+    std::printf(
+        "\nno true pose is within %g s of a tracked image, the first of them at %.3f s: by "
+        "another clock?",
+        truth.association_s, truth.trajectory.front().stamp_s);
+}
+
+void printSummary(const RunSummary& s, const std::string& scale_fault) {
   const auto print = [](const std::string& name, const std::optional<double>& value, double factor,
                         const char* unit) {
     if (value) std::printf(", %s %.1f %s", name.c_str(), factor * *value, unit);
@@ -201,7 +219,6 @@ void printSummary(const RunSummary& s, const std::string& scale_fault, const std
     std::printf("\nscale by %s, known to %.2f %%", scaleSourceName(s.scale_source).c_str(),
                 100.0 * s.scale_sigma);
   if (!scale_fault.empty()) std::printf("\n%s", scale_fault.c_str());
-  std::printf("\nwritten to %s\n", output.c_str());
 }
 
 void setMask(const std::string& path, Tracker* tracker) {
@@ -280,7 +297,9 @@ void run(const Settings& settings) {
   report.write(settings.output);
   if (has_map && options.mapping) tracker.saveMap(settings.output + "/final.map");
   const RunSummary summary = report.summary();
-  printSummary(summary, scale_fault, settings.output);
+  printSummary(summary, scale_fault);
+  printOmissions(summary, report.truth(), images.imagesWithoutStamp());
+  std::printf("\nwritten to %s\n", settings.output.c_str());
   if (summary.frames_tracked == 0)
     throw std::runtime_error("no frame was tracked" + (summary.last_reason.empty()
                                                            ? std::string()

@@ -241,6 +241,12 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   }
   if (lookForOtherMaps(used, frame.get())) current.reset();
   frame->state = state_;
+  // Where not even the second image knew the first, the third one's origin is a claim of nothing.
+  if (current && state_ == TrackingState::kTracking && unrelated_images_ > 1) {
+    frame->state = TrackingState::kInitialising;
+    frame->reason =
+        "no image has to do with the one before: two cameras on one topic, or too few a second?";
+  }
   if (!reason_.empty()) frame->reason = reason_;
   describeState(frame.get());
   if (current) describeMatches(std::move(*current), frame.get());

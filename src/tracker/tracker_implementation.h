@@ -231,6 +231,7 @@ class Tracker::Implementation {
   double lost_stamp_s_ = 0.0;   ///< when the camera was lost
   std::int64_t images_ = 0;
   int resets_ = 0, times_lost_ = 0, jumps_ = 0, late_images_ = 0;
+  int unrelated_images_ = 0;    ///< in a row, each of which became the first of a map
   bool is_pose_given_ = false;  ///< lost, but the filter's camera is where setPose() put it
   int poor_frames_ = 0;         ///< with too few matches, in a row
 };

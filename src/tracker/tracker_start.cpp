@@ -80,16 +80,21 @@ void Tracker::Implementation::start(const cv::Mat& image, TrackedFrame* frame) {
 /// Lets the first images, taken together, correct what the filter made of them one by one. True
 /// when this image became the first instead.
 bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame* frame) {
-  if (initialiser_.isDone()) return false;
+  if (initialiser_.isDone()) {
+    unrelated_images_ = 0;
+    return false;
+  }
   const CameraModel calibrated = camera_.corrected({});
   initialiser_.add(calibrated, {frame->index, last_stamp_s_, current.measurements}, filter_);
   if (initialiser_.isFirstUnrelated()) {
     start(current.image, frame);
     ++resets_;
     ++jumps_;
+    ++unrelated_images_;
     frame->reason = "the first image has nothing to do with the second: started anew from it";
     return true;
   }
+  unrelated_images_ = 0;
   initialiser_.expect(motion_noise_.expected());
   const auto initial = initialiser_.step(calibrated, filter_);
   if (!initial) return false;

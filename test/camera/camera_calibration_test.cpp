@@ -215,6 +215,83 @@ TEST_F(CalibrationYaml, OfOpenCvIsRead) {
             196.0);
 }
 
+TEST_F(CalibrationYaml, OfOpenCvIsThatOfAFisheyeWhereItsFlagSaysSo) {
+  const std::string lens = "distortion_coefficients: {data: [0.1, -0.2, 0.3, 0.4]}\n";
+  EXPECT_EQ(read(size_ + "fisheye_model: 1\n" + matrix_ + lens).distortion_model,
+            DistortionModel::kEquidistant);
+  EXPECT_EQ(read(size_ + "fisheye_model: 0\n" + matrix_ + lens).distortion_model,
+            DistortionModel::kPlumbBob);
+}
+
+TEST_F(CalibrationYaml, OfKalibrIsThatOfTheFirstCameraThatThereIs) {
+  const auto camera = [](const std::string& name, int width) {
+    return name +
+           ":\n  camera_model: pinhole\n  intrinsics: [400, 400, 320, 240]\n  resolution: [" +
+           std::to_string(width) + ", 480]\n  distortion_model: none\n";
+  };
+  EXPECT_EQ(read(camera("cam1", 641) + camera("cam2", 642)).width, 641);
+  EXPECT_EQ(read(camera("cam1", 641) + camera("cam0", 640)).width, 640);
+}
+
+TEST_F(CalibrationYaml, OfEurocIsRead) {
+  const CameraCalibration c = read(
+      "sensor_type: camera\nrate_hz: 20\nresolution: [752, 480]\ncamera_model: pinhole\n"
+      "intrinsics: [458.6, 457.3, 367.2, 248.4]\ndistortion_model: radial-tangential\n"
+      "distortion_coefficients: [-0.28, 0.07, 1e-4, 2e-5]\n");
+  EXPECT_EQ(c.width, 752);
+  EXPECT_EQ(c.fy, 457.3);
+  EXPECT_EQ(c.distortion_model, DistortionModel::kPlumbBob);
+  EXPECT_EQ(c.distortion, (std::vector<double>{-0.28, 0.07, 1e-4, 2e-5}));
+}
+
+TEST_F(CalibrationYaml, OfVinsIsRead) {
+  const std::string head = "%YAML:1.0\n---\n" + size_;
+  CameraCalibration c =
+      read(head +
+           "model_type: PINHOLE\ndistortion_parameters: {k1: -0.3, k2: 0.1, p1: 1e-4, p2: 2e-4}\n"
+           "projection_parameters: {fx: 195, fy: 196, cx: 162, cy: 125}\n");
+  EXPECT_EQ(c.cx, 162.0);
+  EXPECT_EQ(c.distortion_model, DistortionModel::kPlumbBob);
+  EXPECT_EQ(c.distortion, (std::vector<double>{-0.3, 0.1, 1e-4, 2e-4}));
+  c = read(
+      head +
+      "model_type: KANNALA_BRANDT\nprojection_parameters: {k2: 0.1, k3: 0.2, k4: 0.3, k5: 0.4, "
+      "mu: 195, mv: 196, u0: 162, v0: 125}\n");
+  EXPECT_EQ(c.fy, 196.0);
+  EXPECT_EQ(c.cy, 125.0);
+  EXPECT_EQ(c.distortion_model, DistortionModel::kEquidistant);
+  EXPECT_EQ(c.distortion, (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
+  EXPECT_NAMES(faultOfText(head + "model_type: MEI\n"), "'MEI'");
+  EXPECT_NAMES(faultOfText(head + "model_type: PINHOLE\n"), "'projection_parameters' is missing");
+}
+
+TEST_F(CalibrationYaml, OfAPrintedMessageIsRead) {
+  const std::string message =
+      "header: {seq: 0, frame_id: desk}\nheight: 240\nwidth: 320\ndistortion_model: plumb_bob\n"
+      "D: [0.1, -0.2, 0.3, 0.4, 0.5]\nK: [195, 0, 162, 0, 196, 125, 0, 0, 1]\n"
+      "P: [180, 0, 160, 0, 0, 181, 120, 0, 0, 0, 1, 0]\n";
+  const std::string end = "---\nheader: {seq: 1}\n";
+  CameraCalibration c = read(message + end);
+  EXPECT_EQ(c.width, 320);
+  EXPECT_EQ(c.fy, 196.0);
+  EXPECT_EQ(c.distortion, (std::vector<double>{0.1, -0.2, 0.3, 0.4, 0.5}));
+  EXPECT_EQ(readCalibrationYaml(path_, true).fy, 181.0);
+  c = read(message +
+           "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 20, y_offset: 10, height: 200, "
+           "width: 280}\n");
+  EXPECT_EQ(c.width, 140);
+  EXPECT_EQ(c.height, 100);
+  EXPECT_EQ(c.cx, (162.0 - 20.0) / 2.0);
+}
+
+TEST_F(CalibrationYaml, WhatIsNoneOfACameraIsToldByItsFields) {
+  const std::string fault = faultOfText("target_type: aprilgrid\ntagCols: 6\n");
+  EXPECT_NAMES(fault, "target_type, tagCols");
+  EXPECT_NAMES(fault, "ost.yaml");
+  EXPECT_NAMES(faultOfText("# oST version 5.0 parameters\n[image]\n\nwidth\n320\n"), "ost.yaml");
+  EXPECT_NAMES(faultOfText(""), "empty");
+}
+
 TEST_F(CalibrationYaml, OfARectifiedImageIsItsProjection) {
   const std::string projection =
       "projection_matrix: {data: [180, 0, 160, 0, 0, 181, 121, 0, 0, 0, 1, 0]}\n";

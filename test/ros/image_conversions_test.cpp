@@ -82,6 +82,37 @@ TEST(ImageConversions, SixteenBitsMayComeInEitherOrderOfBytes) {
   }
 }
 
+TEST(ImageConversions, SixteenBitsOfWhichMostAreUnusedAreNamed) {
+  cv::Mat ten;
+  shadedImage().convertTo(ten, CV_16UC1, 4.0);
+  for (const char* encoding : {"mono16", "16UC1", "bayer_rggb16"}) {
+    const std::string fault = faultOf([&] { toGrayImage(makeImage(encoding, ten)); });
+    EXPECT_NE(std::string::npos, fault.find("of 65535")) << encoding << ": " << fault;
+  }
+}
+
+TEST(ImageConversions, OfPackedChromaTheBrightnessIsTaken) {
+  cv::Mat pairs;
+  const cv::Mat chroma(shadedImage().size(), CV_8UC1, cv::Scalar(90));
+  cv::merge(std::vector<cv::Mat>{shadedImage(), chroma}, pairs);
+  EXPECT_EQ(0.0, cv::norm(shadedImage(), toGrayImage(makeImage("yuv422_yuy2", pairs))));
+  cv::merge(std::vector<cv::Mat>{chroma, shadedImage()}, pairs);
+  EXPECT_LE(cv::norm(shadedImage(), toGrayImage(makeImage("yuv422", pairs)), cv::NORM_INF), 20.0);
+}
+
+TEST(ImageConversions, WhatIsNoPictureIsNamedWithWhatIsRead) {
+  const cv::Mat depth(4, 4, CV_32FC1, cv::Scalar(1.5)), pairs(4, 4, CV_8UC2, cv::Scalar(1, 2));
+  for (const auto& message : {makeImage("32FC1", depth), makeImage("8UC2", pairs)}) {
+    const std::string fault = faultOf([&] { toGrayImage(message); });
+    EXPECT_NE(std::string::npos, fault.find("'" + message.encoding + "' is no picture")) << fault;
+    EXPECT_NE(std::string::npos, fault.find("mono8")) << fault;
+  }
+  sensor_msgs::CompressedImage compressed;
+  compressed.format = "16UC1; compressedDepth png";
+  compressed.data.resize(100);
+  EXPECT_NE(std::string::npos, faultOf([&] { toGrayImage(compressed); }).find("no picture"));
+}
+
 TEST(ImageConversions, AMaskIsGreyOrRefusedByName) {
   EXPECT_EQ(0.0, cv::norm(shadedImage(), toMask(makeImage("mono8", shadedImage()))));
   const cv::Mat colour(4, 4, CV_8UC3, cv::Scalar(200, 0, 0));

@@ -156,6 +156,74 @@ TEST_F(FieldBags, WhereNoFrameIsTrackedThatIsAFaultWithItsReason) {
   EXPECT_EQ(text.find("the image is empty"), std::string::npos);
 }
 
+TEST_F(FieldBags, WhyFramesAreNotTrackedIsToldInTheSummary) {
+  write("repeated.bag", [](int i, Recorded* recorded) {
+    if (i % 3 == 1) recorded->image.header.stamp = recordedOf(i - 1).image.header.stamp;
+  });
+  EXPECT_SAYS(track("repeated.bag"), "8 frames not tracked, most often: image ignored: the stamp");
+  EXPECT_NE(summary()["untracked_reason"].get<std::string>().find("equals"), std::string::npos);
+  write("sizes.bag", [](int i, Recorded* recorded) {
+    if (i % 2 == 0) return;
+    recorded->image.height = 75;
+    recorded->image.data.resize(75 * recorded->image.step);
+  });
+  EXPECT_SAYS(track("sizes.bag"), "the image is 200 x 75, the calibration 200 x 150");
+  EXPECT_GT(summary()["ms"]["total"]["median"].get<double>(), 0.0);  // of those tracked
+}
+
+TEST_F(FieldBags, ImagesOfTwoCamerasThatCantBeToldApartAreNotCalledTracked) {
+  write("two.bag", [](int i, Recorded* recorded) {
+    if (i % 2 == 0) return;
+    cv::Mat turned(150, 200, CV_8UC1, recorded->image.data.data());
+    cv::flip(turned, turned, -1);
+  });
+  const ProgramOutcome outcome = track("two.bag");
+  EXPECT_LE(summary()["frames_tracked"], 2);
+  EXPECT_SAYS(outcome, "two cameras on one topic");
+}
+
+TEST_F(FieldBags, WithoutStampsTheTimeOfRecordingIsTakenAndThatIsTold) {
+  write("no_stamps.bag",
+        [](int, Recorded* recorded) { recorded->image.header.stamp = ros::Time(); });
+  EXPECT_SAYS(track("no_stamps.bag"), "24 images have no stamp");
+  EXPECT_EQ(summary()["frames_tracked"], kFieldImages);
+}
+
+TEST_F(FieldBags, ATopicMayLackItsSlash) {
+  write("run.bag", [](int, Recorded*) {});
+  EXPECT_EQ(track("run.bag", "--image-topic camera/image_raw").status, 0);
+  EXPECT_EQ(track("run.bag", "--camera-info-topic camera/camera_info").status, 0);
+}
+
+TEST_F(FieldBags, WhereNoTopicIsOfImagesAllAreNamed) {
+  write("run.bag", [](int, Recorded* recorded) { recorded->topic = "/left/image_raw"; });
+  EXPECT_SAYS(track("run.bag"), "image topics there: /left/image_raw");
+  rosbag::Bag bag(path("none.bag"), rosbag::bagmode::Write);
+  bag.write("/camera/camera_info", ros::Time(1000.0), recordedOf(0).info);
+  bag.close();
+  EXPECT_SAYS(track("none.bag"), "but /camera/camera_info (sensor_msgs/CameraInfo)");
+}
+
+TEST_F(FieldBags, AFileThatIsCutOffOrNoneIsNamed) {
+  write("whole.bag", [](int, Recorded*) {});
+  std::filesystem::copy_file(path("whole.bag"), path("cut.bag"));
+  std::filesystem::resize_file(path("cut.bag"), std::filesystem::file_size(path("cut.bag")) / 2);
+  EXPECT_SAYS(track("cut.bag"), path("cut.bag") + ": not a whole bag");
+  EXPECT_SAYS(track("cut.bag"), "rosbag reindex");
+  std::ofstream(path("text.bag")) << "a page of text\n";
+  EXPECT_SAYS(track("text.bag"), path("text.bag") + ": is no bag");
+}
+
+TEST_F(FieldBags, ATruthWithoutPosesOrOfAnotherTimeIsNamed) {
+  write("run.bag", [](int, Recorded*) {});
+  std::ofstream(path("none.txt")) << "# stamp x y z qx qy qz qw\n";
+  EXPECT_SAYS(track("run.bag", "--ground-truth " + path("none.txt")), "there is no pose in it");
+  std::ofstream(path("later.txt")) << "2000 0 0 0 0 0 0 1\n2001 1 0 0 0 0 0 1\n";
+  const ProgramOutcome outcome = track("run.bag", "--ground-truth " + path("later.txt"));
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_SAYS(outcome, "no true pose is within");
+}
+
 TEST_F(FieldBags, ACalibrationThatIsZeroAtFirstIsWaitedFor) {
   write("zero.bag", [](int i, Recorded* recorded) {
     if (i < 5) recorded->info.K.fill(0.0);

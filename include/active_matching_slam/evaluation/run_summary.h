@@ -39,7 +39,8 @@ struct RunSummary {
   int times_lost = 0;
   int resets = 0;
   int late_images = 0;
-  std::string last_reason;  ///< of the last frame that has one: why its state is what it is
+  std::string last_reason;       ///< of the last frame that has one: why its state is what it is
+  std::string untracked_reason;  ///< the most frequent one of frames that were not tracked
   std::string matcher;
   ScaleSource scale_source = ScaleSource::kFree;  ///< at the end
   double scale_sigma = 0.0;  ///< relative, of lengths as a whole at the end; 0: not known
@@ -70,7 +71,8 @@ struct RunSummary {
   int submaps_end = 0, frozen_features_end = 0, trunk_features_most = 0;  ///< FrozenMap
   double lost_bits_end = 0.0;
   int submaps_frozen = 0, submaps_found = 0, loops = 0;
-  std::vector<DurationSummary> durations;  ///< every stage, then "total"
+  /// Every stage, then "total"; over the frames whose image was not ignored.
+  std::vector<DurationSummary> durations;
 };
 
 /// Nothing here depends on durations, except `durations`.

@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "active_matching_slam/ros/one_camera.h"
 #include "active_matching_slam/ros/repeated_warning.h"
 
 namespace active_matching_slam {
@@ -75,10 +76,10 @@ class CameraSubscription {
   ros::Subscriber compressed_subscriber_, info_subscriber_;
   ros::WallTimer watch_timer_;
   ros::WallTime last_look_;  ///< at what is there
-  RepeatedWarning several_warning_;
+  RepeatedWarning several_warning_, calibrations_warning_;
   std::atomic<std::uint64_t> received_{0};
   mutable std::mutex mutex_;  // guards what follows
-  sensor_msgs::CameraInfoConstPtr info_;
+  OneCalibration calibration_;
   ros::WallTime first_image_, last_image_, last_warning_;
   std::string there_;  ///< found when nobody publishes images on the topic
 };

@@ -5,8 +5,9 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
+#include <cstring>
 #include <fstream>
-#include <set>
+#include <map>
 #include <stdexcept>
 
 #include "active_matching_slam/ros/image_conversions.h"
@@ -26,33 +27,47 @@ std::string namesOf(const Bags& bags) {
   return names;
 }
 
+/// As a node's names are: of the root, where nothing else is said.
+std::string absoluteTopic(const std::string& topic) {
+  return topic.empty() || topic.front() == '/' ? topic : "/" + topic;
+}
+
 /// Messages of a topic, in the order of recording.
 std::unique_ptr<rosbag::View> viewOf(const Bags& bags, const std::string& topic) {
   auto view = std::make_unique<rosbag::View>();
-  for (const auto& bag : bags) view->addQuery(*bag, rosbag::TopicQuery(topic));
+  for (const auto& bag : bags) view->addQuery(*bag, rosbag::TopicQuery(absoluteTopic(topic)));
   return view;
 }
 
-std::set<std::string> imageTopics(const Bags& bags) {
-  std::set<std::string> topics;
+/// Types by topic.
+std::map<std::string, std::string> topicsOf(const Bags& bags) {
+  std::map<std::string, std::string> topics;
   rosbag::View view;
   for (const auto& bag : bags) view.addQuery(*bag);
   for (const rosbag::ConnectionInfo* connection : view.getConnections())
-    if (connection->datatype == "sensor_msgs/Image" ||
-        connection->datatype == "sensor_msgs/CompressedImage")
-      topics.insert(connection->topic);
+    topics[connection->topic] = connection->datatype;
   return topics;
 }
 
+bool isImage(const std::string& type) {
+  return type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage";
+}
+
 std::string findImageTopic(const Bags& bags, const std::string& wanted) {
-  const std::set<std::string> topics = imageTopics(bags);
-  for (const std::string& topic : {wanted, wanted + kCompressed})
-    if (topics.count(topic)) return topic;
-  std::string list;
-  for (const std::string& topic : topics) list += (list.empty() ? "" : ", ") + topic;
-  throw std::runtime_error(
-      namesOf(bags) + ": no images on " + wanted + "; " +
-      (list.empty() ? "the bag has no image topic" : "image topics there: " + list));
+  const std::map<std::string, std::string> topics = topicsOf(bags);
+  for (const std::string& topic : {wanted, wanted + kCompressed}) {
+    const auto found = topics.find(topic);
+    if (found != topics.end() && isImage(found->second)) return topic;
+  }
+  std::string images, others;
+  for (const auto& [topic, type] : topics) {
+    if (isImage(type)) images += (images.empty() ? "" : ", ") + topic;
+    others += (others.empty() ? "" : ", ") + topic + " (" + type + ")";
+  }
+  std::string there = "the bag is empty";
+  if (!others.empty()) there = "the bag has no image topic, but " + others;
+  if (!images.empty()) there = "image topics there: " + images;
+  throw std::runtime_error(namesOf(bags) + ": no images on " + wanted + "; " + there);
 }
 
 double stampOf(const std_msgs::Header& header, const ros::Time& recorded) {
@@ -69,6 +84,14 @@ auto reading(const Bags& bags, F read) -> decltype(read()) {
   }
 }
 
+/// By the first words of its format.
+bool isBag(const std::string& path) {
+  const std::string format = "#ROSBAG";
+  std::string begin(format.size(), ' ');
+  std::ifstream(path).read(&begin[0], static_cast<std::streamsize>(begin.size()));
+  return begin == format;
+}
+
 std::unique_ptr<rosbag::Bag> openBag(const std::string& path) {
   if (!std::ifstream(path)) throw std::runtime_error(path + ": cannot be opened");
   auto bag = std::make_unique<rosbag::Bag>();
@@ -78,7 +101,11 @@ std::unique_ptr<rosbag::Bag> openBag(const std::string& path) {
     throw std::runtime_error(path +
                              ": has no index: still recording, or cut off? ('rosbag reindex')");
   } catch (const rosbag::BagException& error) {
-    throw std::runtime_error(path + ": not a whole bag: " + error.what());
+    throw std::runtime_error(path +
+                             (isBag(path) ? ": not a whole bag: cut off? ('rosbag reindex' "
+                                            "saves what is there): "
+                                          : ": is no bag: ") +
+                             error.what());
   }
   return bag;
 }
@@ -93,7 +120,7 @@ Bags openBags(const std::vector<std::string>& paths) {
 
 BagImageSource::BagImageSource(const Bags& bags, const std::string& topic) : bags_(bags) {
   reading(bags_, [&] {
-    topic_ = findImageTopic(bags, topic);
+    topic_ = findImageTopic(bags, absoluteTopic(topic));
     view_ = viewOf(bags, topic_);
     position_ = view_->begin();
   });
@@ -124,6 +151,7 @@ bool BagImageSource::next(cv::Mat* image, double* stamp_s) {
       fault_ = other;
       image->release();
     }
+    if (header.stamp.isZero()) ++images_without_stamp_;
     *stamp_s = stampOf(header, message.getTime());
     ++position_;
     return true;
@@ -140,7 +168,8 @@ bool BagImageSource::skip() {
 
 std::string cameraInfoTopicOf(const std::string& image_topic) {
   std::string topic = image_topic;
-  if (endsWith(topic, kCompressed)) topic.erase(topic.size() - kCompressed.size());
+  for (const char* const transport : {"/compressed", "/compressedDepth", "/theora", "/h264"})
+    if (endsWith(topic, transport)) topic.erase(topic.size() - std::strlen(transport));
   const std::size_t slash = topic.rfind('/');
   return (slash == std::string::npos ? "" : topic.substr(0, slash + 1)) + "camera_info";
 }

@@ -19,7 +19,7 @@ namespace active_matching_slam {
 using Bags = std::vector<std::unique_ptr<rosbag::Bag>>;
 
 /// Opens bags for reading. Throws std::runtime_error naming the file and what is wrong with it:
-/// missing, no bag, without its index (cut off while recording or copying).
+/// missing, no bag, cut off, without its index (still recording).
 Bags openBags(const std::vector<std::string>& paths);
 
 /// The grey images of one topic (sensor_msgs/Image or CompressedImage), in the order of recording
@@ -28,8 +28,8 @@ Bags openBags(const std::vector<std::string>& paths);
 class BagImageSource : public ImageSource {
  public:
   /// `bags` outlive the source. `topic` is also found as `topic`/compressed. Throws
-  /// std::runtime_error that lists the image topics of the bag when there is no such topic, or no
-  /// image on it.
+  /// std::runtime_error that lists the image topics of the bag, or all where there are none, when
+  /// there is no such topic, or no image on it.
   BagImageSource(const Bags& bags, const std::string& topic);
 
   const std::string& topic() const { return topic_; }
@@ -41,6 +41,8 @@ class BagImageSource : public ImageSource {
   bool next(cv::Mat* image, double* stamp_s) override;
   std::string fault() const override { return fault_; }
   bool skip() override;
+  /// Those delivered so far that took the time of recording for want of a stamp.
+  int imagesWithoutStamp() const { return images_without_stamp_; }
 
  private:
   const Bags& bags_;
@@ -48,6 +50,7 @@ class BagImageSource : public ImageSource {
   std::string topic_, fault_;
   std::unique_ptr<rosbag::View> view_;
   rosbag::View::iterator position_;
+  int images_without_stamp_ = 0;
 };
 
 /// camera_info beside an image topic (image_transport::getCameraInfoTopic): /camera/image_raw and
