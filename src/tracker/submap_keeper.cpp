@@ -85,44 +85,6 @@ bool isWellKnown(const FeatureState& feature, const Ekf& filter) {
          filter.sigmaInverseDepth(feature) < kPointSigma * feature.inverse_depth;
 }
 
-/// Makes points of rays, to first order: what is laid aside are points.
-void makePoints(const std::vector<FeatureId>& ids, Ekf* filter) {
-  std::vector<FeatureState> points;
-  std::vector<FeatureId> rays;
-  std::vector<int> kept;  // rows of the state without the rays
-  for (int row = 0; row < cameraErrorSize(filter->camera()); ++row) kept.push_back(row);
-  for (const FeatureState& feature : filter->features()) {
-    const bool is_asked = std::find(ids.begin(), ids.end(), feature.id) != ids.end();
-    if (feature.kind == FeatureKind::kPoint || !is_asked) {
-      for (int k = 0; k < feature.size(); ++k) kept.push_back(feature.offset + k);
-      continue;
-    }
-    points.push_back(feature);
-    rays.push_back(feature.id);
-  }
-  if (rays.empty()) return;
-  const auto rows = 3 * static_cast<Eigen::Index>(points.size());
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, filter->stateSize());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    FeatureState& ray = points[i];
-    const double depth = 1.0 / ray.inverse_depth;
-    auto own = J.middleRows<3>(3 * static_cast<Eigen::Index>(i));
-    if (ray.hasAnchorError()) own.middleCols<3>(ray.offset).setIdentity();
-    own.middleCols<2>(ray.bearingRow()) = depth * ray.tangentBasis();
-    own.col(ray.inverseDepthRow()) = -depth * depth * ray.bearing_world;
-    ray.point_world = ray.position();
-    ray.kind = FeatureKind::kPoint;
-    ray.anchored_at_origin = false;
-  }
-  const Eigen::MatrixXd JP = J * filter->covariance();
-  const Eigen::MatrixXd covariance = JP * J.transpose();
-  Eigen::MatrixXd cross(rows, static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    cross.col(static_cast<Eigen::Index>(k)) = JP.col(kept[k]);
-  filter->removeFeatures(rays);
-  filter->insertFeatures(points, 0.5 * (covariance + covariance.transpose()), cross);
-}
-
 }  // namespace
 
 void SubmapKeeper::clear() {
@@ -247,7 +209,7 @@ bool SubmapKeeper::layAside(double stamp_s, Ekf* filter, FeatureMap* map) {
   const std::vector<FeatureId> resting = candidates(stamp_s, *filter, *map);
   if (static_cast<int>(resting.size()) < kLeastLeaf) return false;
   last_freeze_s_ = stamp_s;
-  makePoints(resting, filter);
+  filter->convertToPoints(resting);  // what is laid aside are points
   const std::vector<FeatureId> chosen =
       relatedTo(resting, static_cast<std::size_t>(options_.leaf_features), *filter);
   FreezeOptions cut;

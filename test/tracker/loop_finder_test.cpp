@@ -19,7 +19,7 @@ struct DriftedCamera {
   Relocalisation found;
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();
 
-  /// `offset`: of the true camera from the one believed, in standard deviations of the drift.
+  /// `offset`: of the true camera from the estimated one, in standard deviations of the drift.
   explicit DriftedCamera(double offset) {
     Eigen::Matrix<double, 12, 1> sigma;
     sigma << Eigen::Vector3d::Constant(kDriftM), Eigen::Vector3d::Constant(kDriftRad),
