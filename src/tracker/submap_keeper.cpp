@@ -95,6 +95,7 @@ void SubmapKeeper::clear() {
 void SubmapKeeper::rescale(double factor) {
   tree_.rescale(factor);
   for (auto& [id, feature] : features_) feature.patch.T_world_camera.translation() *= factor;
+  looked_from_.clear();
 }
 
 void SubmapKeeper::openTrunk(Ekf* filter) {
@@ -118,17 +119,29 @@ void SubmapKeeper::observe(const std::vector<VisibleFeature>& visible,
   for (const VisibleFeature& feature : visible) last_in_view_s_[feature.id] = stamp_s;
   for (const FeatureId id : behind_mask) last_in_view_s_[id] = stamp_s;
   for (const MapFeature& feature : map.features()) last_in_view_s_.emplace(feature.id, stamp_s);
-  const auto isFound = [&map](const Returned& returned) {
+  const auto isOver = [&](Returned& returned) {
     int matched = 0, left = 0;
+    std::size_t missed = 0;
     for (const auto& [id, successes] : returned.successes) {
       const MapFeature* feature = map.find(id);
       if (!feature) continue;
       ++left;
       if (feature->successes > successes) ++matched;
+      missed += mistrusted_.count(id);
     }
-    return matched >= kFoundMatches || left == 0;
+    const bool is_found = matched >= kFoundMatches;
+    if (!returned.is_judged && (is_found || missed >= kLeastInView)) {
+      ++(is_found ? found_where_predicted_ : missed_where_predicted_);
+      returned.is_judged = true;
+    }
+    return is_found || left == 0;
   };
-  returned_.erase(std::remove_if(returned_.begin(), returned_.end(), isFound), returned_.end());
+  returned_.erase(std::remove_if(returned_.begin(), returned_.end(), isOver), returned_.end());
+}
+
+void SubmapKeeper::trust() {
+  mistrusted_.clear();
+  for (Returned& returned : returned_) returned.is_judged = true;  // they were found by a look
 }
 
 std::vector<FeatureId> SubmapKeeper::remove(const std::vector<FeatureId>& ids, Ekf* filter,

@@ -109,6 +109,20 @@ TEST(LoopFinder, ASecondImageConfirmsADriftAndNotAMistake) {
   EXPECT_FALSE(other.confirms(18, predicted * step, next, offset));
 }
 
+TEST(LoopFinder, NoSecondImageConfirmsWhatNoDriftExplains) {
+  const auto isConfirmed = [](double sigmas) {
+    const DriftedCamera drifted(sigmas);
+    const CameraOffset offset =
+        offsetFromSubmap(drifted.filter, drifted.camera, drifted.points, drifted.found);
+    const Eigen::Isometry3d predicted = drifted.filter.camera().poseWorldCamera();
+    LoopWitness witness;
+    witness.confirms(10, predicted, drifted.found, offset);
+    return witness.confirms(14, predicted, drifted.found, offset);
+  };
+  EXPECT_TRUE(isConfirmed(8.0));
+  EXPECT_FALSE(isConfirmed(30.0)) << "a place that only looks the same";
+}
+
 TEST(LoopFinder, WhatIsLoosenedMovesWithTheCameraAsABody) {
   DriftedCamera drifted(0.0);
   Ekf& filter = drifted.filter;
