@@ -20,6 +20,9 @@ constexpr int kResectionSteps = 20;
 /// Of a Gauss-Newton step, in radians and parts of the distance to the points. Derivation: far
 /// below what a pixel is, far above rounding.
 constexpr double kSmallStep = 1e-7;
+/// Of the normal equations. Derivation: a pose whose worst direction is known a thousand times less
+/// well than its best (the square of that) is not known.
+constexpr double kLeastCondition = 1e-6;
 /// Standard: 95 % efficient where errors are Gaussian (Huber 1981).
 constexpr double kHuberSigmas = 1.345;
 /// Standard: sigma of a Gaussian over its median absolute deviation.
@@ -68,12 +71,10 @@ std::vector<Correction> filled(const std::vector<std::optional<Correction>>& kno
 
 std::optional<Isometry3d> resect(const std::vector<Vector3d>& points,
                                  const std::vector<Vector3d>& directions, const Isometry3d& start) {
-  if (points.size() < kLeastSightings) return std::nullopt;
+  if (points.size() < kLeastSightings || directions.size() != points.size()) return std::nullopt;
   Isometry3d pose = start;
   for (int step = 0; step < kResectionSteps; ++step) {
-    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-    Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
-    std::vector<Vector3d> residuals, seen;
+    std::vector<Vector3d> seen, residuals;
     std::vector<double> distances, sizes;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Vector3d ray = pose.inverse() * points[i];
@@ -84,26 +85,27 @@ std::optional<Isometry3d> resect(const std::vector<Vector3d>& points,
       sizes.push_back(residuals.back().norm());
     }
     const double bound = kHuberSigmas * kSigmaOverMedian * medianOf(sizes);
+    const double length = medianOf(distances);  // unit of the shift
+    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double weight = sizes[i] > bound ? bound / sizes[i] : 1.0;
       // The direction's change by a shift and a turn of the camera, both in its own frame.
       Eigen::Matrix<double, 3, 6> J;
       const Vector3d& m = seen[i];
-      J << -(Eigen::Matrix3d::Identity() - m * m.transpose()) / distances[i], skew(m);
+      J << -(Eigen::Matrix3d::Identity() - m * m.transpose()) * (length / distances[i]), skew(m);
       normal += weight * J.transpose() * J;
       right += weight * J.transpose() * residuals[i];
     }
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factor(normal);
+    if (factor.info() != Eigen::Success || !(factor.rcond() > kLeastCondition)) return std::nullopt;
     const Eigen::Matrix<double, 6, 1> change = factor.solve(right);
-    if (factor.info() != Eigen::Success || !factor.isPositive() || !change.allFinite())
-      return std::nullopt;
-    pose.translation() += pose.linear() * change.head<3>();
+    if (!change.allFinite()) return std::nullopt;
+    pose.translation() += length * (pose.linear() * change.head<3>());
     pose.linear() = (Eigen::Quaterniond(pose.linear()) * rotationFromVector(change.tail<3>()))
                         .normalized()
                         .toRotationMatrix();
-    if (change.head<3>().norm() < kSmallStep * medianOf(distances) &&
-        change.tail<3>().norm() < kSmallStep)
-      return pose;
+    if (change.norm() < kSmallStep) return pose;
   }
   return std::nullopt;
 }

@@ -28,10 +28,11 @@ constexpr double kFreezePeriodS = 1.0;
 constexpr int kFoundMatches = 6;
 
 /// log |P|; NaN where P is not positive definite.
-double logDeterminant(const Eigen::Ref<const Eigen::MatrixXd>& P) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(P);
+template <int kSize>
+double logDeterminant(const Eigen::Matrix<double, kSize, kSize>& P) {
+  const Eigen::LLT<Eigen::Matrix<double, kSize, kSize>> factor(P);
   if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
-  return 2.0 * Eigen::MatrixXd(factor.matrixL()).diagonal().array().log().sum();
+  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
 }
 
 /// `count` of the candidates that hang together: the first one, and then ever the one that shares
@@ -55,7 +56,7 @@ std::vector<FeatureId> relatedTo(const std::vector<FeatureId>& candidates, std::
   own -= by_camera * camera.solve(by_camera.transpose());
   std::vector<double> alone(candidates.size());
   for (Eigen::Index i = 0; i < n; ++i)
-    alone[static_cast<std::size_t>(i)] = logDeterminant(own.block<3, 3>(3 * i, 3 * i));
+    alone[static_cast<std::size_t>(i)] = logDeterminant<3>(own.block<3, 3>(3 * i, 3 * i));
   std::vector<double> shared(candidates.size(), -1.0);
   std::vector<char> is_taken(candidates.size(), 0);
   std::vector<FeatureId> taken;
@@ -72,7 +73,7 @@ std::vector<FeatureId> relatedTo(const std::vector<FeatureId>& candidates, std::
       Eigen::Matrix<double, 6, 6> both;
       both << own.block<3, 3>(3 * a, 3 * a), own.block<3, 3>(3 * a, 3 * b),
           own.block<3, 3>(3 * b, 3 * a), own.block<3, 3>(3 * b, 3 * b);
-      const double information = alone[next] + alone[k] - logDeterminant(both);
+      const double information = alone[next] + alone[k] - logDeterminant<6>(both);
       if (std::isfinite(information)) shared[k] = std::max(shared[k], information);
       if (best == candidates.size() || shared[k] > shared[best]) best = k;
     }

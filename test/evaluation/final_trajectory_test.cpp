@@ -98,7 +98,7 @@ TEST(FinalTrajectory, FramesWithoutFeaturesThatAreLeftGoWithTheirNeighbours) {
   EXPECT_LT(run.error(run.finalPoses(), driftOf(0.1)), 0.01);
 }
 
-TEST(FinalTrajectory, AFeatureThatWentAstrayHardlyCounts) {
+TEST(FinalTrajectory, AFeatureThatMovedByItselfHardlyCounts) {
   DriftingRun run([](int) { return driftOf(0.0); });
   for (int k = 0; k < 4; ++k)
     run.frames.back().features[static_cast<std::size_t>(k)].position_world +=
