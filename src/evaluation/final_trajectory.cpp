@@ -98,7 +98,10 @@ std::optional<Isometry3d> resect(const std::vector<Vector3d>& points,
       right += weight * J.transpose() * residuals[i];
     }
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factor(normal);
-    if (factor.info() != Eigen::Success || !(factor.rcond() > kLeastCondition)) return std::nullopt;
+    const Eigen::Matrix<double, 6, 1> pivots = factor.vectorD();
+    if (factor.info() != Eigen::Success ||
+        !(pivots.minCoeff() > kLeastCondition * pivots.maxCoeff()))
+      return std::nullopt;
     const Eigen::Matrix<double, 6, 1> change = factor.solve(right);
     if (!change.allFinite()) return std::nullopt;
     pose.translation() += length * (pose.linear() * change.head<3>());

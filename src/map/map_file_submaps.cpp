@@ -63,7 +63,10 @@ void writeSubmaps(const MapFileContent& content, ByteWriter* out) {
 }
 
 void readSubmaps(std::uint32_t version, ByteReader* in, MapFileContent* content) {
-  content->trunk = readSubmap(in).points;
+  const Leaf trunk = readSubmap(in);
+  if (trunk.id != -1 || trunk.lost_bits != 0.0 || std::signbit(trunk.lost_bits))
+    throw std::runtime_error("the trunk has the number or the bits of a submap");
+  content->trunk = trunk.points;
   content->next_submap =
       in->smallInteger("next number of a submap", 0, std::numeric_limits<int>::max());
   // The least that a submap takes: id, bits, two counts.

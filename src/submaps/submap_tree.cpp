@@ -261,7 +261,10 @@ void SubmapTree::rest(ActiveMap& active, const Ids& ids) {
 
 void SubmapTree::remove(ActiveMap& active, const Ids& ids) {
   if (ids.empty()) return;
-  trunk_.marginalise(active.points(), ids);
+  // Most that leave for good are new, and nothing depends on them.
+  const bool is_needed =
+      std::any_of(ids.begin(), ids.end(), [this](FeatureId id) { return trunk_.dependsOn(id); });
+  trunk_.marginalise(is_needed ? active.points() : PointGaussian(), ids);
   active.remove(ids);
 }
 
