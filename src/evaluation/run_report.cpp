@@ -132,6 +132,14 @@ void addDurationColumns(std::vector<Column>* columns) {
                         }});
 }
 
+std::string frozenSubmapsCsv(const FrozenMap& frozen) {
+  std::string text = "id,features,separators,lost_bits\n";
+  for (const FrozenSubmap& leaf : frozen.leaves)
+    text += cell(leaf.id) + "," + cell(leaf.features) + "," + cell(leaf.separators) + "," +
+            cell(leaf.lost_bits) + "\n";
+  return text;
+}
+
 }  // namespace
 
 void RunReport::add(const TrackedFrame& frame) {
@@ -140,6 +148,8 @@ void RunReport::add(const TrackedFrame& frame) {
     for (auto& [id, position] : last_position_of_) position *= frame.rescaled_by;
   }
   records_.push_back(recordOf(frame));
+  final_.add(frame);
+  frozen_ = frame.frozen;
   if (frame.graph && frame.submaps) {
     graph_ = frame.graph;
     submaps_ = frame.submaps;
@@ -150,6 +160,15 @@ void RunReport::add(const TrackedFrame& frame) {
       continue;
     if (feature.position_world.allFinite()) last_position_of_[feature.id] = feature.position_world;
   }
+}
+
+RunSummary RunReport::summary() const {
+  RunSummary summary = summarise(records_, truth_);
+  const std::vector<PosePair> pairs =
+      pairPoses(finalTrajectory(), truth_.trajectory, truth_.association_s);
+  if (const auto similarity = align(pairs, AlignmentKind::kSimilarity))
+    summary.ate_final_sim3_m = absoluteTrajectoryError(pairs, *similarity);
+  return summary;
 }
 
 std::vector<Eigen::Vector3d> RunReport::mapPoints() const {
@@ -194,9 +213,12 @@ std::string RunReport::trajectoryText() const {
 void RunReport::write(const std::string& directory) const {
   writeTextFile(directory + "/statistics.csv", statisticsCsv());
   writeTextFile(directory + "/trajectory.txt", trajectoryText());
+  writeTextFile(directory + "/trajectory_final.txt", trajectoryTumText(finalTrajectory()));
   writeTextFile(directory + "/summary.json", summaryJson(summary()));
   writeTrajectoryPlot(directory + "/trajectory.png", trajectoryPlotOf(*this));
   if (graph_) writeStructureReport(directory, *graph_, *submaps_);
+  if (frozen_ && !frozen_->leaves.empty())
+    writeTextFile(directory + "/frozen_submaps.csv", frozenSubmapsCsv(*frozen_));
 }
 
 }  // namespace active_matching_slam

@@ -40,6 +40,7 @@ std::string summaryJson(const RunSummary& s) {
   json["ate_sim3_m"] = orNull(s.ate_sim3_m);
   json["ate_se3_m"] = orNull(s.ate_se3_m);
   json["sim3_scale"] = orNull(s.sim3_scale);
+  json["ate_final_sim3_m"] = orNull(s.ate_final_sim3_m);
   json["rpe_m"] = s.rpe ? Json(s.rpe->translation_rmse) : Json(nullptr);
   json["rpe_rad"] = s.rpe ? Json(s.rpe->rotation_rmse_rad) : Json(nullptr);
   json["nees_mean"] = orNull(s.nees_mean);

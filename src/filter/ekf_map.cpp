@@ -231,14 +231,25 @@ void Ekf::inflate(const Eigen::MatrixXd& added) {
 }
 
 std::vector<FeatureId> Ekf::convertToPoints() {
-  std::vector<FeatureId> converted;
+  std::vector<FeatureId> linear;
+  for (const FeatureState& feature : features_) {
+    if (feature.kind == FeatureKind::kInverseDepth &&
+        feature.inverse_depth > options_.minimum_inverse_depth &&
+        linearityIndex(feature, sigmaInverseDepth(feature), camera_.position_world) <
+            options_.linearity_threshold)
+      linear.push_back(feature.id);
+  }
+  convertToPoints(linear);
+  return linear;
+}
+
+void Ekf::convertToPoints(const std::vector<FeatureId>& ids) {
+  if (ids.empty()) return;
   std::vector<std::pair<int, int>> ranges{{0, cameraErrorSize(camera_)}};
   auto P = covariance_.view();
   for (FeatureState& feature : features_) {
     if (feature.kind == FeatureKind::kInverseDepth &&
-        feature.inverse_depth > options_.minimum_inverse_depth &&
-        linearityIndex(feature, sigmaInverseDepth(feature), camera_.position_world) <
-            options_.linearity_threshold) {
+        std::find(ids.begin(), ids.end(), feature.id) != ids.end()) {
       const int o = feature.offset;
       const Eigen::Matrix3d own = positionCovariance(feature);
       const auto J = positionJacobian(feature);
@@ -248,15 +259,11 @@ std::vector<FeatureId> Ekf::convertToPoints() {
       feature.point_world = feature.position();
       feature.kind = FeatureKind::kPoint;
       feature.anchored_at_origin = false;
-      converted.push_back(feature.id);
     }
     ranges.emplace_back(feature.offset, feature.size());
   }
-  if (!converted.empty()) {
-    covariance_.keep(ranges);
-    assignOffsets();
-  }
-  return converted;
+  covariance_.keep(ranges);
+  assignOffsets();
 }
 
 Eigen::Matrix3d Ekf::positionCovariance(const FeatureState& feature) const {

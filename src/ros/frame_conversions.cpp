@@ -212,6 +212,14 @@ ams_msgs::MutualInformationGraph toGraphMsg(const TrackedFrame& frame,
 ams_msgs::SubmapHierarchy toSubmapsMsg(const TrackedFrame& frame, const std_msgs::Header& header) {
   ams_msgs::SubmapHierarchy message;
   message.header = header;
+  if (frame.frozen) {
+    for (const FrozenSubmap& leaf : frame.frozen->leaves) {
+      message.laid_aside.push_back(leaf.id);
+      message.laid_aside_features.push_back(static_cast<std::uint32_t>(leaf.features));
+      message.laid_aside_separators.push_back(static_cast<std::uint32_t>(leaf.separators));
+      message.laid_aside_lost_bits.push_back(finiteOrZero(leaf.lost_bits));
+    }
+  }
   if (!frame.submaps) return message;
   message.ids = frame.submaps->ids;
   const auto fill = [](const SubmapLevel& level, ams_msgs::SubmapLevel* out) {

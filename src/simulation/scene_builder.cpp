@@ -176,6 +176,24 @@ void SceneBuilder::lamp(const Vector3d& position, double size_m, double intensit
   scene_.lights.push_back({position, normal.normalized(), size_m, intensity});
 }
 
+void SceneBuilder::repeatTurned(double yaw_rad) {
+  const auto turn = [yaw_rad](const Vector3d& v) { return turned(yaw_rad, v.x(), v.y(), v.z()); };
+  const std::vector<Surface> surfaces = scene_.surfaces;
+  for (Surface s : surfaces) {
+    s.origin = turn(s.origin);
+    s.u_axis = turn(s.u_axis);
+    s.v_axis = turn(s.v_axis);
+    s.albedo = s.albedo.clone();
+    scene_.surfaces.push_back(std::move(s));
+  }
+  const std::vector<Light> lights = scene_.lights;
+  for (Light light : lights) {
+    light.position = turn(light.position);
+    light.normal = turn(light.normal);
+    scene_.lights.push_back(light);
+  }
+}
+
 void SceneBuilder::sky(const Vector3d& middle, double distance_m, double height_m) {
   const Paint paint = [](const Canvas& c) { return paintSky(c); };
   for (int i = 0; i < 4; ++i) {

@@ -33,6 +33,11 @@ class SceneBuilder {
              const Paint& paint, bool from_above = true, double emission = 0.0);
   // Bodies, which cast shadows.
 
+  /// As upright() and level().
+  void solidUpright(const Eigen::Vector3d& centre, double facing_rad, double width_m,
+                    double height_m, const Paint& paint);
+  void solidLevel(const Eigen::Vector3d& centre, double yaw_rad, double size_x_m, double size_y_m,
+                  const Paint& paint, bool from_above = true);
   /// A box that stands on `base_centre`, its front to -y before it is turned by `yaw_rad`. The
   /// bottom is left out unless asked for.
   void box(const Eigen::Vector3d& base_centre, double yaw_rad, const Eigen::Vector3d& size,
@@ -61,6 +66,9 @@ class SceneBuilder {
   void lamp(const Eigen::Vector3d& position, double size_m, double intensity,
             const Eigen::Vector3d& normal = -Eigen::Vector3d::UnitZ());
 
+  /// All that is there once more, turned about the world's z axis.
+  void repeatTurned(double yaw_rad);
+
   /// The sky around `middle`, with hills towards +y.
   void sky(const Eigen::Vector3d& middle, double distance_m, double height_m);
 
@@ -76,10 +84,6 @@ class SceneBuilder {
  private:
   void add(const Eigen::Vector3d& centre, const Eigen::Vector3d& u, const Eigen::Vector3d& v,
            double width_m, double height_m, const Paint& paint, double emission, bool casts_shadow);
-  void solidUpright(const Eigen::Vector3d& centre, double facing_rad, double width_m,
-                    double height_m, const Paint& paint);
-  void solidLevel(const Eigen::Vector3d& centre, double yaw_rad, double size_x_m, double size_y_m,
-                  const Paint& paint, bool from_above = true);
 
   Scene scene_;
   std::uint64_t seed_;

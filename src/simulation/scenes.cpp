@@ -15,7 +15,7 @@ const std::vector<NamedChoice>& sceneChoices() {
       {"corridor", "two long walls with posters and doors"},
       {"corridor_end", "two walls with posters, nothing on the wall ahead"},
       {"corridor_loop", "a corridor round a block, for the motion loop"},
-      {"rooms", "four rooms alike in a ring of doors, for the motion loop"},
+      {"rooms", "four rooms with doors, opposite ones alike, for the motion loop"},
       {"wall", "one long wall, for moving sideways"},
       {"planks", "a corridor of planks: edges along the way, hardly a corner"},
   };

@@ -135,13 +135,9 @@ Scene makeRooms(std::uint64_t seed) {
                    kThickness = 0.15;
   b.scene().ambient = 0.7;
   b.scene().light_grid_m = 0.25;
-  b.density(110);
-  b.room({-kHalf, -kHalf, 0.0}, {kHalf, kHalf, kHeight},
-         [](const Canvas& c) { return paintTiles(c, 0.5, 0.45); }, plaster(0.8),
-         {plaster(0.7), paintBricks, plaster(0.64), plaster(0.68)});
-  // Four walls from the middle, each with a door where the camera goes through.
-  for (int wall = 0; wall < 4; ++wall) {
-    const double yaw = 0.5 * M_PI * wall;
+  /// From the middle outwards, with a door where the camera goes through.
+  const auto buildWall = [&](double yaw) {
+    b.density(110);
     const Eigen::Rotation2Dd turn(yaw);
     const auto part = [&](double from, double to, double low, double high) {
       const Eigen::Vector2d middle = turn * Eigen::Vector2d(0.5 * (from + to), 0.0);
@@ -151,16 +147,22 @@ Scene makeRooms(std::uint64_t seed) {
     part(0.0, kRadius - kDoor, 0.0, kHeight);
     part(kRadius + kDoor, kHalf, 0.0, kHeight);
     part(kRadius - kDoor, kRadius + kDoor, kLintel, kHeight);
-  }
-  b.density(300);
-  for (int room = 0; room < 4; ++room) {
-    const Eigen::Rotation2Dd turn(0.5 * M_PI * room);
+  };
+  /// A quarter of the whole; its outer walls are those that it sees from within.
+  const auto buildRoom = [&](double yaw, const Paint& ahead, const Paint& aside) {
+    b.density(110);
+    const Eigen::Rotation2Dd turn(yaw);
     const auto place = [&](double x, double y, double z) {
       const Eigen::Vector2d at = turn * Eigen::Vector2d(x, y);
       return Vector3d(at.x(), at.y(), z);
     };
-    const double yaw = 0.5 * M_PI * room;
-    // Alike in all rooms but for textures and small shifts, as rooms of one building are.
+    b.solidLevel(place(0.5 * kHalf, 0.5 * kHalf, 0.0), yaw, kHalf, kHalf,
+                 [](const Canvas& c) { return paintTiles(c, 0.5, 0.45); });
+    b.solidLevel(place(0.5 * kHalf, 0.5 * kHalf, kHeight), yaw, kHalf, kHalf, plaster(0.8), false);
+    b.solidUpright(place(kHalf, 0.5 * kHalf, 0.5 * kHeight), yaw + M_PI, kHalf, kHeight, ahead);
+    b.solidUpright(place(0.5 * kHalf, kHalf, 0.5 * kHeight), yaw - 0.5 * M_PI, kHalf, kHeight,
+                   aside);
+    b.density(300);
     for (double along = 0.8; along < 5.4; along += b.random().uniform(0.8, 1.2)) {
       b.upright(place(kHalf - 0.005, along, b.random().uniform(1.2, 1.8)), yaw + M_PI,
                 b.random().uniform(0.45, 0.8), b.random().uniform(0.4, 0.8), paintPoster);
@@ -168,17 +170,26 @@ Scene makeRooms(std::uint64_t seed) {
                 b.random().uniform(0.45, 0.8), b.random().uniform(0.4, 0.8),
                 b.random().uniform() < 0.5 ? Paint(paintPoster) : Paint(paintCorkBoard));
     }
-    for (const double along : {0.9, 1.8})  // on the walls between rooms, beside the doors
-      for (const double side : {1.0, -1.0})
-        b.upright(place(along, side * (0.5 * kThickness + 0.005), b.random().uniform(1.2, 1.8)),
-                  yaw + side * 0.5 * M_PI, b.random().uniform(0.4, 0.6),
-                  b.random().uniform(0.4, 0.8), paintPoster);
+    for (const double along : {0.9, 1.8}) {  // on the walls between rooms, beside the doors
+      constexpr double kFace = 0.5 * kThickness + 0.005;
+      b.upright(place(along, kFace, b.random().uniform(1.2, 1.8)), yaw + 0.5 * M_PI,
+                b.random().uniform(0.4, 0.6), b.random().uniform(0.4, 0.8), paintPoster);
+      b.upright(place(kFace, along, b.random().uniform(1.2, 1.8)), yaw,
+                b.random().uniform(0.4, 0.6), b.random().uniform(0.4, 0.8), paintPoster);
+    }
     b.bookcase(place(5.0, 5.6, 0.0), yaw, 1.0, 1.9, 5);
     b.table(place(1.3, 1.2, 0.0), yaw, {1.2, 0.8, 0.75}, 0.5);
     b.pile(place(1.3, 1.2, 0.75), yaw + 0.3, 4, 0.3, 0.25, paintPoster);
     b.lamp(place(2.6, 2.6, kHeight - 0.05), 0.6, 2.5);
     b.level(place(2.6, 2.6, kHeight - 0.005), yaw, 0.6, 0.6, plain(0.95), false, 1.0);
-  }
+  };
+  for (const double yaw : {0.0, 0.5 * M_PI}) buildWall(yaw);
+  buildRoom(0.0, paintBricks, plaster(0.7));
+  // The room opposite is the same once more, to the last poster, as in rows of rented rooms: only
+  // what is seen through the doors tells them apart.
+  b.repeatTurned(M_PI);
+  buildRoom(0.5 * M_PI, plaster(0.66), plaster(0.64));
+  buildRoom(1.5 * M_PI, plaster(0.68), plaster(0.62));
   const double a = 0.25 * M_PI;  // in the middle of a room, along the circle
   b.start({kRadius * std::cos(a), kRadius * std::sin(a), 1.5}, a - 0.5 * M_PI, 0.05,
           {-0.5, -0.3, -0.5}, {0.5, 0.3, 1.0}, 1.0);

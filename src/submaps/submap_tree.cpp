@@ -29,11 +29,12 @@ Ids chosen(const Ids& ids, const IdSet& others, bool in) {
 }
 
 /// The `count` points that are nearest to the centre of others.
-Ids nearest(const Conditional& points, const Eigen::Vector3d& centre, int count) {
+Ids nearest(const Ids& points, const Eigen::VectorXd& mean, const Eigen::Vector3d& centre,
+            int count) {
   std::vector<std::pair<double, FeatureId>> distances;
-  for (std::size_t i = 0; i < points.ids.size(); ++i) {
-    const Eigen::Vector3d position = points.mean.segment<3>(static_cast<Index>(3 * i));
-    distances.emplace_back((position - centre).squaredNorm(), points.ids[i]);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d position = mean.segment<3>(static_cast<Index>(3 * i));
+    distances.emplace_back((position - centre).squaredNorm(), points[i]);
   }
   std::sort(distances.begin(), distances.end());
   if (static_cast<int>(distances.size()) > count) distances.resize(slot(count));
@@ -125,11 +126,11 @@ Ids SubmapTree::chooseSeparator(const ActiveMap& active, const Ids& points,
   const int calibration = gaussian.calibrationSize();
 
   // The whole state, and behind it what of the trunk is near.
-  Trunk trunk = trunk_;
-  trunk.refresh(gaussian);
-  const Ids near =
-      nearest(trunk.conditional(), centreOf(gaussian, points), options.trunk_neighbours);
-  const Conditional beside = marginal(trunk.conditional(), near);
+  const Conditional& trunk = trunk_.conditional();
+  const Ids near = trunk_.empty() ? Ids()
+                                  : nearest(trunk.ids, trunk.meanAt(gaussian),
+                                            centreOf(gaussian, points), options.trunk_neighbours);
+  const Conditional beside = trunk_.givenActive(gaussian, near);
   const Index added = beside.mean.size();
   MatrixXd P(state_size + added, state_size + added);
   P.topLeftCorner(state_size, state_size) = state;
@@ -260,7 +261,10 @@ void SubmapTree::rest(ActiveMap& active, const Ids& ids) {
 
 void SubmapTree::remove(ActiveMap& active, const Ids& ids) {
   if (ids.empty()) return;
-  trunk_.marginalise(active.points(), ids);
+  // Most that leave for good are new, and nothing depends on them.
+  const bool is_needed =
+      std::any_of(ids.begin(), ids.end(), [this](FeatureId id) { return trunk_.dependsOn(id); });
+  trunk_.marginalise(is_needed ? active.points() : PointGaussian(), ids);
   active.remove(ids);
 }
 
@@ -301,17 +305,7 @@ Conditional SubmapTree::givenActive(const PointGaussian& active, const Leaf& lea
 }
 
 Conditional SubmapTree::givenActive(const PointGaussian& active, const Ids& ids) const {
-  Trunk trunk = trunk_;
-  trunk.refresh(active);
-  if (ids.empty()) {
-    Conditional none;
-    none.given_ids = active.ids;
-    none.given_mean = active.mean;
-    none.K.resize(0, active.mean.size());
-    none.Q.resize(0, 0);
-    return none;
-  }
-  return marginal(trunk.conditional(), ids);
+  return trunk_.givenActive(active, ids);
 }
 
 void SubmapTree::rescale(double factor) {

@@ -1,5 +1,7 @@
 #include "active_matching_slam/submaps/trunk.h"
 
+#include <unordered_map>
+
 #include "active_matching_slam/math/row_selection.h"
 #include "active_matching_slam/math/semidefinite_factor.h"
 #include "active_matching_slam/math/slot.h"
@@ -42,27 +44,50 @@ std::vector<FeatureId> idsWithout(const std::vector<FeatureId>& ids,
   return idsAt(ids, othersOf(indicesOf(left_out, ids), static_cast<int>(ids.size())));
 }
 
-}  // namespace
-
-void Trunk::refresh(const PointGaussian& active) {
-  Conditional& now = conditional_;
-  if (now.ids.empty()) {
-    now = {};
-    now.K.resize(0, active.mean.size());
+/// Given all of `active`, with the means of now.
+void giveAll(const PointGaussian& active, Conditional* now) {
+  if (now->ids.empty()) {
+    *now = {};
+    now->K.resize(0, active.mean.size());
   } else {
-    now.mean = now.meanAt(active);
-    const MatrixXd K = std::move(now.K);
+    now->mean = now->meanAt(active);
+    const MatrixXd K = std::move(now->K);
     const Index calibration = active.calibrationSize();
-    now.K = MatrixXd::Zero(K.rows(), active.mean.size());
-    now.K.leftCols(calibration) = K.leftCols(calibration);
-    const std::vector<int> where = indicesOf(now.given_ids, active.ids);
+    now->K = MatrixXd::Zero(K.rows(), active.mean.size());
+    now->K.leftCols(calibration) = K.leftCols(calibration);
+    const std::vector<int> where = indicesOf(now->given_ids, active.ids);
     for (std::size_t i = 0; i < where.size(); ++i) {
-      now.K.middleCols(active.firstRow(where[i]), 3) =
+      now->K.middleCols(active.firstRow(where[i]), 3) =
           K.middleCols(calibration + 3 * static_cast<Index>(i), 3);
     }
   }
-  now.given_ids = active.ids;
-  now.given_mean = active.mean;
+  now->given_ids = active.ids;
+  now->given_mean = active.mean;
+}
+
+/// Leaves out given points on which nothing depends.
+void leaveOutGiven(const std::vector<FeatureId>& ids, Conditional* conditional) {
+  const int calibration = conditional->calibrationSize();
+  const std::vector<int> kept = othersOf(indicesOf(ids, conditional->given_ids),
+                                         static_cast<int>(conditional->given_ids.size()));
+  std::vector<int> columns(slot(calibration));
+  for (int i = 0; i < calibration; ++i) columns[slot(i)] = i;
+  const std::vector<int> of_points = rowsOf(calibration, kept);
+  columns.insert(columns.end(), of_points.begin(), of_points.end());
+  conditional->given_ids = idsAt(conditional->given_ids, kept);
+  conditional->given_mean = selectRows(conditional->given_mean, columns);
+  conditional->K = selectColumns(conditional->K, columns);
+}
+
+}  // namespace
+
+void Trunk::refresh(const PointGaussian& active) { giveAll(active, &conditional_); }
+
+Conditional Trunk::givenActive(const PointGaussian& active,
+                               const std::vector<FeatureId>& ids) const {
+  Conditional some = marginal(conditional_, ids);
+  giveAll(active, &some);
+  return some;
 }
 
 void Trunk::take(const PointGaussian& active, const std::vector<FeatureId>& ids) {
@@ -122,8 +147,30 @@ Conditional Trunk::give(const PointGaussian& active, const std::vector<FeatureId
 
 void Trunk::marginalise(const PointGaussian& active, const std::vector<FeatureId>& ids) {
   if (empty()) return;
+  // Most that leave for good are new, and nothing depends on them.
+  std::vector<FeatureId> needed, idle;
+  const std::unordered_map<FeatureId, int> where = indicesOf(conditional_.given_ids);
+  for (const FeatureId id : ids) {
+    const auto found = where.find(id);
+    if (found == where.end()) continue;
+    const Index column = conditional_.calibrationSize() + 3 * static_cast<Index>(found->second);
+    (conditional_.K.middleCols(column, 3).isZero(0.0) ? idle : needed).push_back(id);
+  }
+  if (needed.empty()) {
+    leaveOutGiven(idle, &conditional_);
+    return;
+  }
   take(active, ids);
   forget(ids);
+}
+
+bool Trunk::dependsOn(FeatureId id) const {
+  for (std::size_t i = 0; i < conditional_.given_ids.size(); ++i) {
+    if (conditional_.given_ids[i] != id) continue;
+    const Index column = conditional_.calibrationSize() + 3 * static_cast<Index>(i);
+    return !conditional_.K.middleCols(column, 3).isZero(0.0);
+  }
+  return false;
 }
 
 void Trunk::forget(const std::vector<FeatureId>& ids) {

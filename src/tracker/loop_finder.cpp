@@ -18,6 +18,11 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 /// Of a camera's offset. Cost: of one right loop in ten thousand a second look is taken.
 constexpr double kExpectedProbability = 0.9999;
+/// Standard deviations of a drift over those that the filter knows of, at most. Cost: a larger
+/// drift is not corrected. Two images of a place that only looks like another say the same, too: so
+/// they do not count at any distance. (Filters were found too sure by 2 to 3 where the lens or the
+/// shutter was not as told.)
+constexpr double kPossibleInflation = 5.0;
 constexpr int kPoseFreedoms = 6;
 /// Images that a look counts for. Cost: a mistake has so long to be made twice.
 constexpr std::int64_t kLookMemoryImages = 100;
@@ -81,6 +86,11 @@ bool CameraOffset::isExpected() const {
   return squared <= chiSquareQuantile(kPoseFreedoms, kExpectedProbability);
 }
 
+bool CameraOffset::isPossible() const {
+  return squared <= kPossibleInflation * kPossibleInflation *
+                        chiSquareQuantile(kPoseFreedoms, kExpectedProbability);
+}
+
 CameraOffset offsetFromSubmap(const Ekf& filter, const CameraModel& camera,
                               const Conditional& points, const Relocalisation& found) {
   CameraOffset result;
@@ -122,6 +132,7 @@ void loosenCamera(const Matrix6& added, const std::vector<FeatureId>& carried, E
 
 bool LoopWitness::confirms(std::int64_t image, const Eigen::Isometry3d& T_world_camera,
                            const Relocalisation& found, const CameraOffset& offset) {
+  if (!offset.isPossible()) return false;
   looks_.erase(
       std::remove_if(looks_.begin(), looks_.end(),
                      [image](const Look& look) { return image - look.image > kLookMemoryImages; }),

@@ -23,6 +23,9 @@ struct CameraOffset {
   double squared = 0.0;
   /// Whether that is within what chance explains.
   bool isExpected() const;
+  /// Whether a drift explains it that is some times larger than the filter knows; else the submap
+  /// is of a place that only looks the same.
+  bool isPossible() const;
 };
 
 /// `points`: of a submap, given the active map (SubmapTree::givenActive()). `found`: the camera as
@@ -40,7 +43,8 @@ void loosenCamera(const Eigen::Matrix<double, 6, 6>& added, const std::vector<Fe
 class LoopWitness {
  public:
   void clear() { looks_.clear(); }
-  /// Whether an earlier image says the same; else it is remembered. `T_world_camera`: predicted.
+  /// Whether an earlier image says the same; else it is remembered, if it is possible at all.
+  /// `T_world_camera`: predicted.
   bool confirms(std::int64_t image, const Eigen::Isometry3d& T_world_camera,
                 const Relocalisation& found, const CameraOffset& offset);
 

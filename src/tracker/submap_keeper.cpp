@@ -28,10 +28,11 @@ constexpr double kFreezePeriodS = 1.0;
 constexpr int kFoundMatches = 6;
 
 /// log |P|; NaN where P is not positive definite.
-double logDeterminant(const Eigen::Ref<const Eigen::MatrixXd>& P) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(P);
+template <int kSize>
+double logDeterminant(const Eigen::Matrix<double, kSize, kSize>& P) {
+  const Eigen::LLT<Eigen::Matrix<double, kSize, kSize>> factor(P);
   if (factor.info() != Eigen::Success) return std::numeric_limits<double>::quiet_NaN();
-  return 2.0 * Eigen::MatrixXd(factor.matrixL()).diagonal().array().log().sum();
+  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
 }
 
 /// `count` of the candidates that hang together: the first one, and then ever the one that shares
@@ -55,7 +56,7 @@ std::vector<FeatureId> relatedTo(const std::vector<FeatureId>& candidates, std::
   own -= by_camera * camera.solve(by_camera.transpose());
   std::vector<double> alone(candidates.size());
   for (Eigen::Index i = 0; i < n; ++i)
-    alone[static_cast<std::size_t>(i)] = logDeterminant(own.block<3, 3>(3 * i, 3 * i));
+    alone[static_cast<std::size_t>(i)] = logDeterminant<3>(own.block<3, 3>(3 * i, 3 * i));
   std::vector<double> shared(candidates.size(), -1.0);
   std::vector<char> is_taken(candidates.size(), 0);
   std::vector<FeatureId> taken;
@@ -72,7 +73,7 @@ std::vector<FeatureId> relatedTo(const std::vector<FeatureId>& candidates, std::
       Eigen::Matrix<double, 6, 6> both;
       both << own.block<3, 3>(3 * a, 3 * a), own.block<3, 3>(3 * a, 3 * b),
           own.block<3, 3>(3 * b, 3 * a), own.block<3, 3>(3 * b, 3 * b);
-      const double information = alone[next] + alone[k] - logDeterminant(both);
+      const double information = alone[next] + alone[k] - logDeterminant<6>(both);
       if (std::isfinite(information)) shared[k] = std::max(shared[k], information);
       if (best == candidates.size() || shared[k] > shared[best]) best = k;
     }
@@ -85,44 +86,6 @@ bool isWellKnown(const FeatureState& feature, const Ekf& filter) {
          filter.sigmaInverseDepth(feature) < kPointSigma * feature.inverse_depth;
 }
 
-/// Makes points of rays, to first order: what is laid aside are points.
-void makePoints(const std::vector<FeatureId>& ids, Ekf* filter) {
-  std::vector<FeatureState> points;
-  std::vector<FeatureId> rays;
-  std::vector<int> kept;  // rows of the state without the rays
-  for (int row = 0; row < cameraErrorSize(filter->camera()); ++row) kept.push_back(row);
-  for (const FeatureState& feature : filter->features()) {
-    const bool is_asked = std::find(ids.begin(), ids.end(), feature.id) != ids.end();
-    if (feature.kind == FeatureKind::kPoint || !is_asked) {
-      for (int k = 0; k < feature.size(); ++k) kept.push_back(feature.offset + k);
-      continue;
-    }
-    points.push_back(feature);
-    rays.push_back(feature.id);
-  }
-  if (rays.empty()) return;
-  const auto rows = 3 * static_cast<Eigen::Index>(points.size());
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(rows, filter->stateSize());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    FeatureState& ray = points[i];
-    const double depth = 1.0 / ray.inverse_depth;
-    auto own = J.middleRows<3>(3 * static_cast<Eigen::Index>(i));
-    if (ray.hasAnchorError()) own.middleCols<3>(ray.offset).setIdentity();
-    own.middleCols<2>(ray.bearingRow()) = depth * ray.tangentBasis();
-    own.col(ray.inverseDepthRow()) = -depth * depth * ray.bearing_world;
-    ray.point_world = ray.position();
-    ray.kind = FeatureKind::kPoint;
-    ray.anchored_at_origin = false;
-  }
-  const Eigen::MatrixXd JP = J * filter->covariance();
-  const Eigen::MatrixXd covariance = JP * J.transpose();
-  Eigen::MatrixXd cross(rows, static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t k = 0; k < kept.size(); ++k)
-    cross.col(static_cast<Eigen::Index>(k)) = JP.col(kept[k]);
-  filter->removeFeatures(rays);
-  filter->insertFeatures(points, 0.5 * (covariance + covariance.transpose()), cross);
-}
-
 }  // namespace
 
 void SubmapKeeper::clear() {
@@ -133,6 +96,7 @@ void SubmapKeeper::clear() {
 void SubmapKeeper::rescale(double factor) {
   tree_.rescale(factor);
   for (auto& [id, feature] : features_) feature.patch.T_world_camera.translation() *= factor;
+  looked_from_.clear();
 }
 
 void SubmapKeeper::openTrunk(Ekf* filter) {
@@ -156,17 +120,29 @@ void SubmapKeeper::observe(const std::vector<VisibleFeature>& visible,
   for (const VisibleFeature& feature : visible) last_in_view_s_[feature.id] = stamp_s;
   for (const FeatureId id : behind_mask) last_in_view_s_[id] = stamp_s;
   for (const MapFeature& feature : map.features()) last_in_view_s_.emplace(feature.id, stamp_s);
-  const auto isFound = [&map](const Returned& returned) {
+  const auto isOver = [&](Returned& returned) {
     int matched = 0, left = 0;
+    std::size_t missed = 0;
     for (const auto& [id, successes] : returned.successes) {
       const MapFeature* feature = map.find(id);
       if (!feature) continue;
       ++left;
       if (feature->successes > successes) ++matched;
+      missed += mistrusted_.count(id);
     }
-    return matched >= kFoundMatches || left == 0;
+    const bool is_found = matched >= kFoundMatches;
+    if (!returned.is_judged && (is_found || missed >= kLeastInView)) {
+      ++(is_found ? found_where_predicted_ : missed_where_predicted_);
+      returned.is_judged = true;
+    }
+    return is_found || left == 0;
   };
-  returned_.erase(std::remove_if(returned_.begin(), returned_.end(), isFound), returned_.end());
+  returned_.erase(std::remove_if(returned_.begin(), returned_.end(), isOver), returned_.end());
+}
+
+void SubmapKeeper::trust() {
+  mistrusted_.clear();
+  for (Returned& returned : returned_) returned.is_judged = true;  // they were found by a look
 }
 
 std::vector<FeatureId> SubmapKeeper::remove(const std::vector<FeatureId>& ids, Ekf* filter,
@@ -247,7 +223,7 @@ bool SubmapKeeper::layAside(double stamp_s, Ekf* filter, FeatureMap* map) {
   const std::vector<FeatureId> resting = candidates(stamp_s, *filter, *map);
   if (static_cast<int>(resting.size()) < kLeastLeaf) return false;
   last_freeze_s_ = stamp_s;
-  makePoints(resting, filter);
+  filter->convertToPoints(resting);  // what is laid aside are points
   const std::vector<FeatureId> chosen =
       relatedTo(resting, static_cast<std::size_t>(options_.leaf_features), *filter);
   FreezeOptions cut;

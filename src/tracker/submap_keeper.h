@@ -85,10 +85,13 @@ class SubmapKeeper {
                           FeatureMap* map);
 
   /// At most `most` submaps that may be in view, as far as is known where they are, but not where
-  /// they are predicted: those first that were not looked at for longest.
+  /// they are predicted: those first that were not looked at for longest. Each is then not named
+  /// again until the view has changed.
   std::vector<int> loopCandidates(const std::map<FeatureId, Eigen::Vector3d>& positions,
                                   const Ekf& filter, const CameraModel& camera,
                                   const MapOptions& options, int most);
+  /// A submap was found but has to be seen once more: from the same place, too.
+  void lookAgain(int leaf) { looked_from_.erase(leaf); }
   /// At most `most` submaps in turn, the newest first.
   std::vector<int> inTurn(int most);
   /// Features of a submap where they are now.
@@ -98,7 +101,11 @@ class SubmapKeeper {
   /// `before`, has been moved.
   void movePatches(const std::map<FeatureId, Eigen::Vector3d>& before, const Ekf& filter);
   /// A loop was closed: what did not match where it was predicted may now.
-  void trust() { mistrusted_.clear(); }
+  void trust();
+  /// Submaps that were made active since they should have been in view: so many were matched there,
+  /// so many were not, though most of what should be seen was searched in vain.
+  int foundWherePredicted() const { return found_where_predicted_; }
+  int missedWherePredicted() const { return missed_where_predicted_; }
 
   /// As files keep it. The means are those of now.
   void save(const Ekf& filter, MapFileContent* content) const;
@@ -112,17 +119,23 @@ class SubmapKeeper {
   static constexpr int kSlack = 30;
 
  private:
+  /// Features of a submap in view, for it to be searched, and missed for it to be missed.
+  /// Derivation: what a relocalisation must find (relocaliser/minimum_inliers).
+  static constexpr std::size_t kLeastInView = 10;
   /// Separators that go to the trunk or come back together at least. Cost: each time is a
   /// factorisation of the map's covariance.
   static constexpr std::size_t kLeastSeparators = 4;
 
   void exchange(double stamp_s, Ekf* filter, FeatureMap* map);
   bool isResting(FeatureId id, double stamp_s) const;
+  double relativeSigma(const Leaf& leaf, FeatureId middle, const PointGaussian& active,
+                       const Ekf& filter) const;
   std::vector<FeatureId> candidates(double stamp_s, const Ekf& filter, const FeatureMap& map) const;
 
   /// A submap that was made active, and how often each of its features had been matched.
   struct Returned {
     std::map<FeatureId, int> successes;
+    bool is_judged = false;  ///< whether it was found where it was predicted
   };
 
   SubmapFilterOptions options_;
@@ -137,9 +150,11 @@ class SubmapKeeper {
   /// last asked for, and by which count of looks it was looked for.
   std::map<int, double> sigma_of_;
   std::map<int, int> looked_at_;
+  std::map<int, Eigen::Isometry3d> looked_from_;  ///< in vain
   int looks_ = 0, next_in_turn_ = 0, next_sigma_ = 0;
   double last_freeze_s_ = -1e9, last_rest_s_ = -1e9;
   int frozen_ = 0, found_ = 0;
+  int found_where_predicted_ = 0, missed_where_predicted_ = 0;
 };
 
 }  // namespace active_matching_slam

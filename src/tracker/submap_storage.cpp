@@ -4,27 +4,13 @@
 #include "submap_keeper.h"
 
 namespace active_matching_slam {
-namespace {
-
-StoredSubmap stored(const Conditional& points, int id, double lost_bits) {
-  return {id,          lost_bits,         points.ids, points.given_ids,
-          points.mean, points.given_mean, points.K,   points.Q};
-}
-
-Conditional conditionalOf(const StoredSubmap& stored) {
-  return {stored.ids, stored.mean, stored.given_ids, stored.given_mean, stored.K, stored.Q};
-}
-
-}  // namespace
 
 void SubmapKeeper::save(const Ekf& filter, MapFileContent* content) const {
   if (tree_.empty()) return;
   Trunk trunk = tree_.trunk();
   trunk.refresh(activePoints(filter));
-  content->trunk = stored(trunk.conditional(), -1, 0.0);
-  if (trunk.empty()) content->trunk = {};
-  for (const Leaf& leaf : tree_.leaves())
-    content->submaps.push_back(stored(leaf.points, leaf.id, leaf.lost_bits));
+  if (!trunk.empty()) content->trunk = trunk.conditional();
+  content->submaps = tree_.leaves();
   content->next_submap = tree_.nextLeaf();
   for (const auto& [id, feature] : features_) content->frozen.push_back(feature);
 }
@@ -32,17 +18,9 @@ void SubmapKeeper::save(const Ekf& filter, MapFileContent* content) const {
 void SubmapKeeper::restore(const MapFileContent& content) {
   clear();
   if (content.frozen.empty()) return;
-  std::vector<Leaf> leaves;
-  for (const StoredSubmap& submap : content.submaps) {
-    Leaf leaf;
-    leaf.id = submap.id;
-    leaf.points = conditionalOf(submap);
-    leaf.lost_bits = submap.lost_bits;
-    leaves.push_back(leaf);
-  }
-  tree_.restore(conditionalOf(content.trunk), leaves, content.next_submap);
+  tree_.restore(content.trunk, content.submaps, content.next_submap);
   for (const MapFeature& feature : content.frozen) features_.emplace(feature.id, feature);
-  frozen_ = static_cast<int>(leaves.size());
+  frozen_ = static_cast<int>(content.submaps.size());
 }
 
 std::shared_ptr<const FrozenMap> SubmapKeeper::describe(const Ekf& filter) const {
@@ -51,6 +29,8 @@ std::shared_ptr<const FrozenMap> SubmapKeeper::describe(const Ekf& filter) const
   for (const Leaf& leaf : tree_.leaves()) {
     for (const FeatureId id : leaf.points.ids) leaf_of[id] = leaf.id;
     description->lost_bits += leaf.lost_bits;
+    description->leaves.push_back({leaf.id, static_cast<int>(leaf.points.ids.size()),
+                                   static_cast<int>(leaf.points.given_ids.size()), leaf.lost_bits});
   }
   for (const auto& [id, position] : positions(filter)) {
     const auto leaf = leaf_of.find(id);

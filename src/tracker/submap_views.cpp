@@ -12,8 +12,6 @@
 namespace active_matching_slam {
 namespace {
 
-/// Of these, in view, for it to be searched. Derivation: what a relocalisation must find.
-constexpr int kLeastInView = 10;
 /// Three sigma of a place relative to the camera, over its depth, up to which it is searched where
 /// it is predicted. Derivation: the search region is then as wide as a tenth of a view of 90
 /// degrees to either side, and templates are warped for a scale that is right to 20 %.
@@ -91,7 +89,23 @@ std::vector<FrozenView> SubmapKeeper::visible(const std::map<FeatureId, Eigen::V
 
 namespace {
 
-/// Whether most of the `views` lie where they are predicted relative to the camera.
+/// At most `most` of the views, spread evenly over them.
+std::vector<const FrozenView*> someOf(const std::vector<const FrozenView*>& views,
+                                      std::size_t most) {
+  if (views.size() <= most) return views;
+  std::vector<const FrozenView*> some;
+  for (std::size_t k = 0; k < most; ++k) some.push_back(views[k * views.size() / most]);
+  return some;
+}
+
+std::vector<FeatureId> idsOf(const std::vector<const FrozenView*>& views) {
+  std::vector<FeatureId> ids;
+  for (const FrozenView* view : views) ids.push_back(view->id);
+  return ids;
+}
+
+/// Whether most of the `views`, whose points are given, lie where they are predicted relative to
+/// the camera.
 bool areSearchable(const std::vector<const FrozenView*>& views, const Conditional& points,
                    const Ekf& filter) {
   const PointInsertion joint = pointInsertion(filter, points);
@@ -124,8 +138,11 @@ int SubmapKeeper::submapInView(const std::vector<FrozenView>& views, const Ekf& 
     if (seen.size() >= kLeastInView) most.emplace_back(seen.size(), leaf);
   if (most.empty()) return -1;
   const int best = std::max_element(most.begin(), most.end())->second;
-  const Conditional points = tree_.givenActive(activePoints(filter), *tree_.find(best));
-  return areSearchable(of_leaf[best], points, filter) ? best : -1;
+  const std::vector<const FrozenView*> some = someOf(of_leaf[best], kLeastInView);
+  Leaf seen = *tree_.find(best);
+  seen.points = marginal(seen.points, idsOf(some));
+  const Conditional points = tree_.givenActive(activePoints(filter), seen);
+  return areSearchable(some, points, filter) ? best : -1;
 }
 
 std::vector<FeatureId> SubmapKeeper::separatorsInView(const std::vector<FrozenView>& views,
@@ -138,44 +155,73 @@ std::vector<FeatureId> SubmapKeeper::separatorsInView(const std::vector<FrozenVi
     ids.push_back(view.id);
   }
   if (ids.size() < kLeastSeparators) return {};
-  const Conditional points = tree_.givenActive(activePoints(filter), ids);
-  return areSearchable(seen, points, filter) ? ids : std::vector<FeatureId>();
+  const std::vector<const FrozenView*> some = someOf(seen, kLeastInView);
+  const Conditional points = tree_.givenActive(activePoints(filter), idsOf(some));
+  return areSearchable(some, points, filter) ? ids : std::vector<FeatureId>();
 }
 
 namespace {
 
-/// A submap as a ball, and where it was seen from.
-struct Ball {
-  FeatureId middle = -1;  ///< its feature nearest to the centre
+/// Of a viewpoint, relative to the distance, or a turn [rad], up to which a look in vain need not
+/// be made anew. Derivation: corners are described at scales that stand 1.26 apart: what has
+/// changed by less is the same to them.
+constexpr double kNewView = 0.26;
+
+double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+/// Whether a feature, as far off its place as `sigma3`, may be in view from where its patch can be
+/// matched.
+bool mayBeInView(const Eigen::Vector3d& position, const SourcePatch& patch, double sigma3,
+                 const Eigen::Isometry3d& T_world_camera, double half_view,
+                 const MapOptions& options) {
+  const Eigen::Vector3d from_camera = position - T_world_camera.translation();
+  const Eigen::Vector3d to_first = patch.T_world_camera.translation() - position;
+  const double distance = from_camera.norm(), first_distance = to_first.norm();
+  if (distance - sigma3 > first_distance / options.minimum_scale ||
+      distance + sigma3 < first_distance / options.maximum_scale)
+    return false;
+  if (distance <= sigma3) return true;
+  const double spread = std::asin(sigma3 / distance);
+  return angleBetween(-from_camera, to_first) - spread <=
+             options.maximum_view_angle_deg * M_PI / 180.0 &&
+         angleBetween(from_camera, T_world_camera.linear().col(2)) - spread < half_view;
+}
+
+/// Of a leaf: its centre, and the feature nearest to that.
+struct Middle {
+  FeatureId id = -1;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double radius = 0.0;
-  Eigen::Vector3d seen_from = Eigen::Vector3d::Zero();
 };
 
-/// Whether a ball, as far off its place as `sigma3`, may be in view from where it can be matched.
-bool mayBeInView(const Ball& ball, double sigma3, const Ekf& filter, const CameraModel& camera,
-                 const MapOptions& options) {
-  const Eigen::Isometry3d T_world_camera = filter.camera().poseWorldCamera();
-  const Eigen::Vector3d from_camera = ball.centre - T_world_camera.translation();
-  const double distance = from_camera.norm(), reach = ball.radius + sigma3;
-  const double first_distance = (ball.centre - ball.seen_from).norm();
-  if (distance - reach > first_distance / options.minimum_scale ||
-      distance + reach < first_distance / options.maximum_scale)
-    return false;
-  if (distance <= reach) return true;
-  const double spread = std::asin(reach / distance);
-  const auto angle = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-    return std::atan2(a.cross(b).norm(), a.dot(b));
-  };
-  if (angle(-from_camera, ball.seen_from - ball.centre) - spread >
-      options.maximum_view_angle_deg * M_PI / 180.0)
-    return false;
-  const double half_view =
-      std::atan2(0.5 * std::hypot(camera.width(), camera.height()), camera.calibration().fx);
-  return angle(from_camera, T_world_camera.linear().col(2)) - spread < half_view;
+Middle middleOf(const Leaf& leaf, const std::map<FeatureId, Eigen::Vector3d>& positions) {
+  Middle middle;
+  for (const FeatureId id : leaf.points.ids)
+    middle.centre += positions.at(id) / static_cast<double>(leaf.points.ids.size());
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const FeatureId id : leaf.points.ids) {
+    const double distance = (positions.at(id) - middle.centre).norm();
+    if (distance < nearest) middle.id = id;
+    nearest = std::min(nearest, distance);
+  }
+  return middle;
 }
 
 }  // namespace
+
+/// Standard deviation of a leaf's middle relative to the camera.
+double SubmapKeeper::relativeSigma(const Leaf& leaf, FeatureId middle, const PointGaussian& active,
+                                   const Ekf& filter) const {
+  Leaf one = leaf;
+  one.points = marginal(leaf.points, {middle});
+  const PointInsertion joint = pointInsertion(filter, tree_.givenActive(active, one));
+  const Eigen::Matrix3d cross = joint.cross_covariance.middleCols<3>(CameraError::kPosition);
+  const double variance = (joint.own_covariance + filter.cameraCovariance().topLeftCorner<3, 3>() -
+                           cross - cross.transpose())
+                              .trace();
+  return std::sqrt(std::max(variance, 0.0));
+}
 
 std::vector<int> SubmapKeeper::loopCandidates(const std::map<FeatureId, Eigen::Vector3d>& positions,
                                               const Ekf& filter, const CameraModel& camera,
@@ -183,46 +229,36 @@ std::vector<int> SubmapKeeper::loopCandidates(const std::map<FeatureId, Eigen::V
   // Cost: of each, a product with the map's covariance; what changes slowly is asked for in turn.
   constexpr int kSigmasPerLook = 4;
   const std::vector<Leaf>& leaves = tree_.leaves();
-  std::vector<Ball> balls;
-  for (const Leaf& leaf : leaves) {
-    Ball ball;
-    const auto count = static_cast<double>(leaf.points.ids.size());
-    for (const FeatureId id : leaf.points.ids) {
-      ball.centre += positions.at(id) / count;
-      ball.seen_from += features_.at(id).patch.T_world_camera.translation() / count;
-    }
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const FeatureId id : leaf.points.ids) {
-      const double distance = (positions.at(id) - ball.centre).norm();
-      ball.radius = std::max(ball.radius, distance);
-      if (distance < nearest) ball.middle = id;
-      nearest = std::min(nearest, distance);
-    }
-    balls.push_back(ball);
-  }
   const PointGaussian active = activePoints(filter);
   const int asked = std::min(kSigmasPerLook, static_cast<int>(leaves.size()));
   for (int k = 0; k < asked; ++k) {
-    const std::size_t i = static_cast<std::size_t>(next_sigma_++) % leaves.size();
-    Leaf middle = leaves[i];
-    middle.points = marginal(middle.points, {balls[i].middle});
-    const PointInsertion joint = pointInsertion(filter, tree_.givenActive(active, middle));
-    const Eigen::Matrix3d cross = joint.cross_covariance.middleCols<3>(CameraError::kPosition);
-    const double variance =
-        (joint.own_covariance + filter.cameraCovariance().topLeftCorner<3, 3>() - cross -
-         cross.transpose())
-            .trace();
-    sigma_of_[leaves[i].id] = std::sqrt(std::max(variance, 0.0));
+    const Leaf& leaf = leaves[static_cast<std::size_t>(next_sigma_++) % leaves.size()];
+    sigma_of_[leaf.id] = relativeSigma(leaf, middleOf(leaf, positions).id, active, filter);
   }
+  const Eigen::Isometry3d T_world_camera = filter.camera().poseWorldCamera();
+  const double half_view =
+      std::atan2(0.5 * std::hypot(camera.width(), camera.height()), camera.calibration().fx);
   std::vector<std::pair<int, int>> found;  // when looked at, id
-  for (std::size_t i = 0; i < leaves.size(); ++i) {
-    const auto sigma = sigma_of_.find(leaves[i].id);
+  for (const Leaf& leaf : leaves) {
+    const auto sigma = sigma_of_.find(leaf.id);
     if (sigma == sigma_of_.end()) continue;
-    const double distance = (balls[i].centre - filter.camera().position_world).norm();
-    const bool is_mistrusted = mistrusted_.count(balls[i].middle) > 0;
+    const Middle middle = middleOf(leaf, positions);
+    const double distance = (middle.centre - T_world_camera.translation()).norm();
+    const bool is_mistrusted = mistrusted_.count(middle.id) > 0;
     if (3.0 * sigma->second <= kSearchableSigma3 * distance && !is_mistrusted) continue;
-    if (mayBeInView(balls[i], 3.0 * sigma->second, filter, camera, options))
-      found.emplace_back(looked_at_[leaves[i].id], leaves[i].id);
+    const auto last = looked_from_.find(leaf.id);
+    if (last != looked_from_.end()) {
+      const Eigen::Isometry3d T_last_now = last->second.inverse() * T_world_camera;
+      if (T_last_now.translation().norm() < kNewView * distance &&
+          Eigen::AngleAxisd(T_last_now.linear()).angle() < kNewView)
+        continue;
+    }
+    std::size_t in_view = 0;
+    for (const FeatureId id : leaf.points.ids)
+      if (mayBeInView(positions.at(id), features_.at(id).patch, 3.0 * sigma->second, T_world_camera,
+                      half_view, options))
+        ++in_view;
+    if (in_view >= kLeastInView) found.emplace_back(looked_at_[leaf.id], leaf.id);
   }
   std::sort(found.begin(), found.end());
   std::vector<int> chosen;
@@ -231,6 +267,7 @@ std::vector<int> SubmapKeeper::loopCandidates(const std::map<FeatureId, Eigen::V
     if (static_cast<int>(chosen.size()) == most) break;
     chosen.push_back(id);
     looked_at_[id] = looks_;
+    looked_from_[id] = T_world_camera;
   }
   return chosen;
 }

@@ -197,6 +197,20 @@ TEST_F(Run, StatisticsHaveOneRowAFrameAndUnitsInTheirNames) {
   EXPECT_LT(std::stod(rows[7].at("position_error_m")), 1e-9);
 }
 
+TEST_F(Run, SubmapsThatWereLaidAsideAreListed) {
+  RunReport plain = report(true), with_submaps = report(true);
+  TrackedFrame last = frameAt(89);
+  auto frozen = std::make_shared<FrozenMap>();
+  frozen->leaves = {{3, 21, 10, 2.5}, {7, 40, 8, 0.125}};
+  last.frozen = frozen;
+  with_submaps.add(last);
+  plain.write(directory_);
+  EXPECT_FALSE(std::filesystem::exists(directory_ + "/frozen_submaps.csv"));
+  with_submaps.write(directory_);
+  EXPECT_EQ(contentOf(directory_ + "/frozen_submaps.csv"),
+            "id,features,separators,lost_bits\n3,21,10,2.5\n7,40,8,0.125\n");
+}
+
 TEST_F(Run, AReasonWithCommasAndQuotesStaysOneCell) {
   EXPECT_NE(report(false).statisticsCsv().find(",\"too few matches, 3 of \"\"4\"\"\","),
             std::string::npos);

@@ -374,6 +374,27 @@ TEST_F(EkfMap, ConvertsWellKnownDepthsOnlyAndWithTheProperJacobian) {
   EXPECT_EQ(filter.covariance(), filter.covariance().transpose().eval());
 }
 
+TEST_F(EkfMap, ConvertsTheFeaturesItIsAskedFor) {
+  Ekf filter = exampleFilter(model_, 9);
+  filter.convertToPoints();
+  const FeatureId sharp =
+      filter.addInverseDepthFeature(model_, Eigen::Vector2d(200.0, 150.0), 0.5, 0.005);
+  const FeatureId vague =
+      filter.addInverseDepthFeature(model_, Eigen::Vector2d(400.0, 250.0), 0.5, 0.02);
+  Ekf by_index = filter, none = filter;
+  ASSERT_EQ(by_index.convertToPoints(), std::vector<FeatureId>{sharp});
+  filter.convertToPoints({sharp});
+  EXPECT_EQ(filter.covariance(), by_index.covariance());
+  const Eigen::Matrix3d covariance = filter.positionCovariance(*filter.find(vague));
+  const FeatureId other = filter.features().front().id;
+  filter.convertToPoints({vague, other, 1000});  // a point and an unknown one besides
+  EXPECT_EQ(filter.find(vague)->kind, FeatureKind::kPoint);
+  EXPECT_LT((filter.positionCovariance(*filter.find(vague)) - covariance).norm(),
+            1e-12 * covariance.norm());
+  none.convertToPoints({});
+  EXPECT_EQ(none.find(vague)->kind, FeatureKind::kInverseDepth);
+}
+
 /// The same filter with rows for anchors at the origin too, about which nothing is uncertain.
 Ekf withAllAnchors(const Ekf& filter) {
   std::vector<FeatureState> features = filter.features();

@@ -121,10 +121,10 @@ TEST_F(EkfUpdate, FindsItsWayFromWhereTheCameraIsBelievedToBe) {
     const FeatureId id = prior.addPointFeature(point, 1e-4 * Eigen::Matrix3d::Identity());
     measurements.push_back({id, pixel, 0.0});
   }
-  Eigen::Isometry3d believed = moved;  // as a resection would have it, a little off
-  believed.translation() += Eigen::Vector3d(0.02, 0.03, -0.02);
+  Eigen::Isometry3d assumed = moved;  // as a resection would have it, a little off
+  assumed.translation() += Eigen::Vector3d(0.02, 0.03, -0.02);
   const Eigen::VectorXd start =
-      errorOfMotion(believed, prior.camera(), prior.features(), carried, prior.stateSize());
+      errorOfMotion(assumed, prior.camera(), prior.features(), carried, prior.stateSize());
   Ekf filter = prior;
   const UpdateReport report = filter.update(model_, measurements, {}, Corrected::kAll, start);
   EXPECT_TRUE(report.healthy);

@@ -327,7 +327,7 @@ MapFileContent mapWithSubmaps() {
   MapFileContent content = smallMap();
   content.next_id = 9;
   content.next_submap = 5;
-  const auto fill = [](StoredSubmap* submap) {
+  const auto fill = [](Conditional* submap) {
     const auto rows = 3 * static_cast<Eigen::Index>(submap->ids.size());
     const auto columns = 5 + 3 * static_cast<Eigen::Index>(submap->given_ids.size());
     submap->mean = Eigen::VectorXd::LinSpaced(rows, 1.0, 2.0);
@@ -339,12 +339,12 @@ MapFileContent mapWithSubmaps() {
   content.trunk.ids = {5};
   content.trunk.given_ids = {1, 3};
   fill(&content.trunk);
-  StoredSubmap submap;
+  Leaf submap;
   submap.id = 3;
   submap.lost_bits = 1.0 / 7.0;
-  submap.ids = {8, 6};
-  submap.given_ids = {1, 5};
-  fill(&submap);
+  submap.points.ids = {8, 6};
+  submap.points.given_ids = {1, 5};
+  fill(&submap.points);
   content.submaps.push_back(submap);
   for (const FeatureId id : {5, 6, 8}) {
     content.frozen.push_back(content.map[0]);
@@ -365,12 +365,12 @@ TEST_F(MapFile, KeepsWhatWasLaidAsideBitForBit) {
   ASSERT_EQ(read.submaps.size(), 1u);
   EXPECT_EQ(read.submaps[0].id, 3);
   EXPECT_EQ(read.submaps[0].lost_bits, written.submaps[0].lost_bits);
-  EXPECT_EQ(read.submaps[0].ids, written.submaps[0].ids);
-  EXPECT_EQ(read.submaps[0].given_ids, written.submaps[0].given_ids);
-  EXPECT_EQ(read.submaps[0].mean, written.submaps[0].mean);
-  EXPECT_EQ(read.submaps[0].given_mean, written.submaps[0].given_mean);
-  EXPECT_EQ(read.submaps[0].K, written.submaps[0].K);
-  EXPECT_EQ(read.submaps[0].Q, written.submaps[0].Q);
+  EXPECT_EQ(read.submaps[0].points.ids, written.submaps[0].points.ids);
+  EXPECT_EQ(read.submaps[0].points.given_ids, written.submaps[0].points.given_ids);
+  EXPECT_EQ(read.submaps[0].points.mean, written.submaps[0].points.mean);
+  EXPECT_EQ(read.submaps[0].points.given_mean, written.submaps[0].points.given_mean);
+  EXPECT_EQ(read.submaps[0].points.K, written.submaps[0].points.K);
+  EXPECT_EQ(read.submaps[0].points.Q, written.submaps[0].points.Q);
   ASSERT_EQ(read.frozen.size(), 3u);
   EXPECT_EQ(read.frozen[2].id, 8);
   EXPECT_EQ(read.frozen[2].successes, 7);
@@ -387,16 +387,16 @@ TEST_F(MapFile, RefusesSubmapsThatHangOnNothing) {
     }
   };
   MapFileContent content = mapWithSubmaps();
-  content.submaps[0].given_ids[1] = 7;
+  content.submaps[0].points.given_ids[1] = 7;
   expectFault(content, "submap 3 hangs on feature 7");
   content = mapWithSubmaps();
-  content.submaps[0].ids[0] = 5;
+  content.submaps[0].points.ids[0] = 5;
   expectFault(content, "submap 3 holds feature 5");
   content = mapWithSubmaps();
   content.trunk.Q(1, 1) = -1.0;
   expectFault(content, "the trunk has a negative variance");
   content = mapWithSubmaps();
-  content.submaps[0].K.resize(6, 2);
+  content.submaps[0].points.K.resize(6, 2);
   expectFault(content, "matrices of another size");
   content = mapWithSubmaps();
   content.frozen.pop_back();

@@ -8,6 +8,8 @@
 #include <stdexcept>
 
 #include "active_matching_slam/simulation/motions.h"
+#include "active_matching_slam/simulation/renderer.h"
+#include "active_matching_slam/simulation/simulator.h"
 
 namespace active_matching_slam {
 namespace {
@@ -66,6 +68,32 @@ TEST(Scenes, AnUnknownNameIsRefusedWithTheList) {
                  "scene = 'moon' is not one of room, office, walkway, desk, checkerboard, "
                  "two_depths, corridor, corridor_end, corridor_loop, rooms, wall, planks");
   }
+}
+
+/// Seen in the rooms from a place in the first one, looking away from the doors, after a turn about
+/// their middle.
+cv::Mat viewOfRooms(const Renderer& renderer, double turn_rad) {
+  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
+  const Vector3d ahead = Vector3d(1.0, 1.0, 0.0).normalized(), down = -Vector3d::UnitZ();
+  T_world_camera.linear() << down.cross(ahead), down, ahead;
+  T_world_camera.translation() = Vector3d(2.0, 2.0, 1.5);
+  T_world_camera.prerotate(Eigen::AngleAxisd(turn_rad, Vector3d::UnitZ()));
+  cv::Mat image;
+  renderer.render(T_world_camera, image);
+  return image;
+}
+
+TEST(Rooms, OppositeOnesLookTheSameAndNeighboursDoNot) {
+  const CameraModel camera(makeSimulatedCalibration(160, 120, "none"));
+  const Renderer renderer(camera, createScene("rooms", 5));
+  const cv::Mat first = viewOfRooms(renderer, 0.0);
+  const auto difference = [&](double turn_rad) {
+    return cv::norm(first, viewOfRooms(renderer, turn_rad), cv::NORM_L1) /
+           static_cast<double>(first.total());
+  };
+  EXPECT_LT(difference(M_PI), 1e-3);
+  EXPECT_GT(difference(0.5 * M_PI), 0.03);
+  EXPECT_GT(difference(1.5 * M_PI), 0.03);
 }
 
 Surface floorOf(double level) {

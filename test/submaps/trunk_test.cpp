@@ -42,6 +42,61 @@ TEST(Trunk, PointsComeBackAsTheyLeft) {
   EXPECT_LT((orderedCovariance(before) - orderedCovariance(map)).norm(), 1e-9);
 }
 
+TEST(Trunk, TellsOfSomeOfItsPointsWithoutTheOthers) {
+  PlainActiveMap map = test::randomMap(12, idsFrom(0, 4), 3);
+  SubmapTree tree;
+  tree.rest(map, {8, 10, 9});
+  test::RandomNumbers random(4);
+  run(test::randomFrame({0, 1, 2}, random), map);
+  Trunk whole = tree.trunk();
+  whole.refresh(map.points());
+  const Conditional expected = marginal(whole.conditional(), {9, 8});
+  const Conditional some = tree.trunk().givenActive(map.points(), {9, 8});
+  EXPECT_EQ(some.ids, expected.ids);
+  EXPECT_EQ(some.given_ids, expected.given_ids);
+  EXPECT_LT((some.mean - expected.mean).norm(), 1e-12);
+  EXPECT_LT((some.K - expected.K).norm(), 1e-12);
+  EXPECT_LT((some.Q - expected.Q).norm(), 1e-12);
+}
+
+TEST(Trunk, APointOfWhichItKnowsNothingLeavesItAsItWas) {
+  PlainActiveMap map = test::randomMap(12, idsFrom(0, 4), 5);
+  SubmapTree tree;
+  tree.rest(map, {8, 9});
+  test::RandomNumbers random(6);
+  Conditional fresh;
+  fresh.ids = {50};
+  fresh.given_ids = {1};
+  fresh.mean = random.matrix(3, 1);
+  fresh.given_mean = random.matrix(test::kCalibration + 3, 1);
+  fresh.K = random.matrix(3, test::kCalibration + 3);
+  fresh.Q = MatrixXd::Identity(3, 3);
+  map.insert(fresh);
+  EXPECT_TRUE(tree.trunk().dependsOn(0));
+  EXPECT_FALSE(tree.trunk().dependsOn(50));
+  EXPECT_FALSE(tree.trunk().dependsOn(1000));
+  for (const bool is_listed : {false, true}) {
+    SubmapTree other = tree;
+    PlainActiveMap rest = map;
+    Trunk listing = other.trunk();
+    if (is_listed) {  // with columns of zeros
+      listing.refresh(map.points());
+      other.restore(listing.conditional(), {}, 0);
+    }
+    const Conditional before = marginal(other.trunk().conditional(), {8, 9});
+    other.remove(rest, {50});
+    EXPECT_EQ(other.trunk().conditional().Q, before.Q);
+    const auto& given = other.trunk().ids();
+    EXPECT_EQ(given, before.ids);
+    EXPECT_EQ(std::count(other.trunk().conditional().given_ids.begin(),
+                         other.trunk().conditional().given_ids.end(), 50),
+              0);
+    EXPECT_LT(test::difference(other.trunk().joint(rest.points(), {8, 9}),
+                               tree.trunk().joint(rest.points(), {8, 9})),
+              1e-12);
+  }
+}
+
 TEST(Trunk, EqualsThePlainFilterWhateverHappensInBetween) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     PlainActiveMap plain = test::randomMap(14, idsFrom(0, 4), seed);

@@ -19,7 +19,7 @@ struct DriftedCamera {
   Relocalisation found;
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();
 
-  /// `offset`: of the true camera from the one believed, in standard deviations of the drift.
+  /// `offset`: of the true camera from the estimated one, in standard deviations of the drift.
   explicit DriftedCamera(double offset) {
     Eigen::Matrix<double, 12, 1> sigma;
     sigma << Eigen::Vector3d::Constant(kDriftM), Eigen::Vector3d::Constant(kDriftRad),
@@ -107,6 +107,20 @@ TEST(LoopFinder, ASecondImageConfirmsADriftAndNotAMistake) {
   EXPECT_FALSE(other.confirms(14, predicted * step, wrong, offset));
   other.clear();
   EXPECT_FALSE(other.confirms(18, predicted * step, next, offset));
+}
+
+TEST(LoopFinder, NoSecondImageConfirmsWhatNoDriftExplains) {
+  const auto isConfirmed = [](double sigmas) {
+    const DriftedCamera drifted(sigmas);
+    const CameraOffset offset =
+        offsetFromSubmap(drifted.filter, drifted.camera, drifted.points, drifted.found);
+    const Eigen::Isometry3d predicted = drifted.filter.camera().poseWorldCamera();
+    LoopWitness witness;
+    witness.confirms(10, predicted, drifted.found, offset);
+    return witness.confirms(14, predicted, drifted.found, offset);
+  };
+  EXPECT_TRUE(isConfirmed(8.0));
+  EXPECT_FALSE(isConfirmed(30.0)) << "a place that only looks the same";
 }
 
 TEST(LoopFinder, WhatIsLoosenedMovesWithTheCameraAsABody) {

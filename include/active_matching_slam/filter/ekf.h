@@ -176,6 +176,9 @@ class Ekf {
   void inflate(const Eigen::MatrixXd& added);
   /// Turns features whose depth is well known into points by the linearity index; returns which.
   std::vector<FeatureId> convertToPoints();
+  /// Turns these features into points, to first order, however well their depths are known. Ignores
+  /// points and unknown ids.
+  void convertToPoints(const std::vector<FeatureId>& ids);
 
   /// `sigma_px`: of the measurements, per axis; 0: FilterOptions::sigma_px. `instead`: S as if the
   /// last predict() had been given these accelerations (until the state changes otherwise).
@@ -187,7 +190,7 @@ class Ekf {
   /// by the inflated R; once these are known, the impulse of the last predict(), which is
   /// independent of the past, by R.
   /// `start`: where the state is so far off that a linearisation there would be of no use, an error
-  /// state (see applyError()) that leads to where it is believed to be. The first linearisation is
+  /// state (see applyError()) that leads to where it is estimated to be. The first linearisation is
   /// made there, and others follow until they converge; the result counts from the present mean as
   /// ever. Empty: none.
   UpdateReport update(const CameraModel& camera,

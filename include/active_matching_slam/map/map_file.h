@@ -10,18 +10,9 @@
 #include "active_matching_slam/filter/feature_state.h"
 #include "active_matching_slam/information/mutual_information_graph.h"
 #include "active_matching_slam/map/feature_map.h"
+#include "active_matching_slam/submaps/submap_tree.h"
 
 namespace active_matching_slam {
-
-/// Points that were laid aside, given others and the camera's calibration: N(mean + K (x_given -
-/// given_mean), Q); x_given: the calibration, then the points `given_ids`.
-struct StoredSubmap {
-  int id = -1;
-  double lost_bits = 0.0;
-  std::vector<FeatureId> ids, given_ids;
-  Eigen::VectorXd mean, given_mean;
-  Eigen::MatrixXd K, Q;
-};
 
 /// All that a tracker must know to go on where it was.
 struct MapFileContent {
@@ -31,8 +22,8 @@ struct MapFileContent {
   Eigen::MatrixXd covariance;          ///< camera, then features in their order
   std::vector<MapFeature> map;         ///< the same ids in the same order
   MutualInformationGraph graph;        ///< of the map and of what has left it; may be empty
-  StoredSubmap trunk;                  ///< separators out of view, given features of the map
-  std::vector<StoredSubmap> submaps;   ///< ascending id, given features of the map or the trunk
+  Conditional trunk;                   ///< separators out of view, given features of the map
+  std::vector<Leaf> submaps;           ///< ascending id, given features of the map or the trunk
   int next_submap = 0;
   std::vector<MapFeature> frozen;  ///< those of trunk and submaps, ascending id
   FeatureId next_id = 0;

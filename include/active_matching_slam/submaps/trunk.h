@@ -28,6 +28,9 @@ class Trunk {
   /// The means of now: m <- m + K (x_M - c), c <- x_M. Every operation begins with it.
   void refresh(const PointGaussian& active);
 
+  /// Some of S given M as it is now.
+  Conditional givenActive(const PointGaussian& active, const std::vector<FeatureId>& ids) const;
+
   /// M -> S. With T the points `ids`, A = M \ T, G = P_TA P_AA^-1, Q_T = P_TT - G P_AT:
   ///   K <- [K_A + K_T G; G],  Q <- [Q + K_T Q_T K_T^T, K_T Q_T; Q_T K_T^T, Q_T].
   /// The filter removes them afterwards.
@@ -40,6 +43,9 @@ class Trunk {
   /// Points of M that the filter will remove for good: S keeps what it knew of the others through
   /// them.
   void marginalise(const PointGaussian& active, const std::vector<FeatureId>& ids);
+
+  /// Whether S tells of this point of M. If not, it may leave at no cost.
+  bool dependsOn(FeatureId id) const;
 
   /// Leaves out points of S.
   void forget(const std::vector<FeatureId>& ids);

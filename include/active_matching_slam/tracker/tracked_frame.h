@@ -83,10 +83,18 @@ struct FrozenFeature {
   Eigen::Vector3d position_world = Eigen::Vector3d::Zero();
 };
 
+/// A submap that has left the active map.
+struct FrozenSubmap {
+  int id = -1;
+  int features = 0, separators = 0;
+  double lost_bits = 0.0;  ///< by its links to the rest, but for its separators, when it was cut
+};
+
 /// What has left the active map and is kept, as submaps (SubmapTree).
 struct FrozenMap {
   std::vector<FrozenFeature> features;       ///< ascending id
   std::vector<FeatureId> active_separators;  ///< of leaves, in the active map; ascending
+  std::vector<FrozenSubmap> leaves;          ///< ascending id
   int submaps = 0;                           ///< leaves
   int trunk_features = 0;
   double lost_bits = 0.0;     ///< by the leaves' links to the rest that were cut, their sum
