@@ -16,9 +16,18 @@ sourceSpace() {
 }
 
 # Ubuntu keeps ROS apart from the system; Debian does not.
-if [ -z "${CMAKE_PREFIX_PATH:-}" ] && [ -r /opt/ros/noetic/setup.bash ]; then
-  sourceSpace /opt/ros/noetic
-fi
+enterRos() {
+  if [ -z "${CMAKE_PREFIX_PATH:-}" ] && [ -r /opt/ros/noetic/setup.bash ]; then
+    sourceSpace /opt/ros/noetic
+  fi
+}
+enterRos
+
+# With the options of scripts/install_dependencies. On Ubuntu ROS itself may only be there afterwards.
+installDependencies() {
+  "$repository/scripts/install_dependencies" "$@"
+  enterRos
+}
 
 # As many compilers side by side as there are cores, and memory for (1.5 GB each).
 buildJobs() {

@@ -20,41 +20,13 @@
 #include <cmath>
 
 #include "active_matching_slam/matching/matcher.h"
+#include "active_matching_slam/rviz_panel/report_text.h"
 
 namespace active_matching_slam {
 namespace {
 
-using ams_msgs::TrackingState;
-
 /// Between two looks at the report. Cost: a few labels redrawn each time.
 constexpr int kRefreshPeriod_ms = 100;
-
-const char* const kDrawPrefix = "draw/";
-
-QString badgeStyle(const char* color) {
-  return QString(
-             "QLabel { background: %1; color: white; font-weight: bold; border-radius: 3px; "
-             "padding: 3px 8px; }")
-      .arg(color);
-}
-
-const char* stateColor(int state) {
-  switch (state) {
-    case TrackingState::TRACKING:
-      return "#2e7d32";
-    case TrackingState::INITIALISING:
-      return "#b26a00";
-    case TrackingState::LOST:
-      return "#c62828";
-    default:
-      return "#616161";
-  }
-}
-
-QString scaleText(const TrackingState& state) {
-  if (state.scale_source == TrackingState::SCALE_FREE) return "free: lengths are in map units";
-  return "metres, from " + QString::fromStdString(state.scale_source_name).replace('_', ' ');
-}
 
 QFormLayout* addForm(QBoxLayout* column) {
   auto* form = new QFormLayout;
@@ -69,10 +41,6 @@ QString resolvedName(const QString& name) {
   std::string error;
   if (name.isEmpty() || !ros::names::validate(name.toStdString(), error)) return name;
   return QString::fromStdString(ros::names::resolve(name.toStdString()));
-}
-
-void setText(QLabel* label, const QString& text) {
-  if (label->text() != text) label->setText(text);
 }
 
 }  // namespace
@@ -164,7 +132,7 @@ void TrackerPanel::addStatus(QBoxLayout* column) {
   badge_ = new QLabel;
   badge_->setObjectName("state");
   badge_->setAlignment(Qt::AlignCenter);
-  badge_->setStyleSheet(badgeStyle(stateColor(-1)));
+  setBadgeColor(unknownStateColor());
   badge_->setText("INITIALISING");  // the longest
   badge_->setMinimumWidth(badge_->sizeHint().width());
   row->addWidget(badge_);
@@ -186,6 +154,8 @@ void TrackerPanel::addStatus(QBoxLayout* column) {
   };
   scale_ = addRow("Scale", "scale");
   map_ = addRow("Map", "map");
+  laid_aside_ = addRow("Laid aside", "laid_aside");
+  laid_aside_title_ = qobject_cast<QLabel*>(lines->labelForField(laid_aside_));
   matches_ = addRow("Image", "matches");
 }
 
@@ -241,7 +211,7 @@ void TrackerPanel::addMap(QBoxLayout* column) {
 }
 
 void TrackerPanel::addSubmaps(QBoxLayout* column) {
-  submaps_ = new QGroupBox("Submaps");
+  submaps_ = new QGroupBox("Hierarchy of submaps");
   submaps_->setObjectName("submaps");
   submaps_->setCheckable(true);
   submaps_->setToolTip("off: this panel doesn't ask for them, which costs the tracker time");
@@ -295,169 +265,6 @@ void TrackerPanel::save(rviz::Config config) const {
   config.mapSetValue("Tracker", name_->currentText());
   config.mapSetValue("Map File", file_->text());
   config.mapSetValue("Submaps", submaps_->isChecked());
-}
-
-void TrackerPanel::refresh() {
-  const TrackerReport report = link_.report();
-  offerTrackers(report);
-  showStatus(report);
-  showStatistics(report);
-  showSubmaps(report);
-  showParameters(report);
-  showAnswer(report);
-}
-
-void TrackerPanel::offerTrackers(const TrackerReport& report) {
-  if (offered_ == report.others || name_->view()->isVisible()) return;
-  offered_ = report.others;
-  const QSignalBlocker quiet(name_);
-  const QString text = name_->currentText();
-  name_->clear();
-  for (const std::string& other : offered_) name_->addItem(QString::fromStdString(other));
-  name_->setEditText(text);
-}
-
-void TrackerPanel::showStatus(const TrackerReport& report) {
-  QString state, reason;
-  const char* color = stateColor(-1);
-  const bool has_state = report.is_there && report.state;
-  if (report.tracker.empty()) {
-    state = "NO NAME";
-    reason = QString("'%1' is no name of a tracker").arg(name_->currentText());
-  } else if (!report.has_master) {
-    state = "NO MASTER";
-    reason = "the ROS master does not answer";
-  } else if (!report.is_asked_for) {
-    state = "...";
-  } else if (!report.is_there) {
-    state = "NO TRACKER";
-    reason = "no tracker at " + QString::fromStdString(report.tracker);
-    QStringList others;
-    for (const std::string& other : report.others)
-      if (other != report.tracker) others << QString::fromStdString(other);
-    if (!others.empty()) reason += "; there is one at " + others.join(", ");
-  } else if (!report.state) {
-    state = "WAITING";
-    reason = "no image was tracked yet";
-  } else {
-    state = QString::fromStdString(report.state->state_name).toUpper();
-    color = stateColor(report.state->state);
-    reason = QString::fromStdString(report.state->reason.empty() ? report.state->quality_reason
-                                                                 : report.state->reason);
-    // A second is longer than the interval of any camera that can be tracked.
-    if (report.silence_s > 1.0)
-      reason += QString("%1last image %2 s ago")
-                    .arg(reason.isEmpty() ? "" : "; ")
-                    .arg(std::floor(report.silence_s), 0, 'f', 0);
-  }
-  setText(badge_, state);
-  const QString style = badgeStyle(color);
-  if (badge_->styleSheet() != style) badge_->setStyleSheet(style);
-  setText(reason_, reason);
-  reason_->setVisible(!reason.isEmpty());
-
-  const bool has_quality = has_state && report.state->state == TrackingState::TRACKING &&
-                           std::isfinite(report.state->quality);
-  quality_->setEnabled(has_quality);
-  quality_->setValue(has_quality ? static_cast<int>(std::lround(100 * report.state->quality)) : 0);
-  quality_->setFormat(has_quality ? QString("quality %1").arg(report.state->quality, 0, 'f', 2)
-                                  : QString("quality -"));
-  for (QPushButton* button : buttons_) button->setEnabled(report.is_there);
-}
-
-void TrackerPanel::showStatistics(const TrackerReport& report) {
-  const QString none = "-";
-  if (!report.is_there || !report.state) {
-    for (QLabel* label : {scale_, map_, matches_}) setText(label, none);
-    return;
-  }
-  setText(scale_, scaleText(*report.state));
-  const auto& statistics = report.statistics;
-  setText(map_, QString("%1%2lost %3 times, %4 resets")
-                    .arg(statistics ? QString("%1 features, ").arg(statistics->features) : "")
-                    .arg(report.state->map > 1 ? QString("no. %1, ").arg(report.state->map) : "")
-                    .arg(report.state->times_lost)
-                    .arg(report.state->resets));
-  setText(matches_, statistics ? QString("%1 of %2 matched by %3, %4 ms")
-                                     .arg(statistics->matched)
-                                     .arg(statistics->candidates)
-                                     .arg(QString::fromStdString(statistics->matcher))
-                                     .arg(statistics->total_ms, 0, 'f', 1)
-                               : none);
-}
-
-void TrackerPanel::showSubmaps(const TrackerReport& report) {
-  if (!report.is_there || !report.submaps || report.submaps->levels.empty()) {
-    setText(submaps_text_, submaps_->isChecked() ? "none yet" : "not asked for");
-    return;
-  }
-  const auto& levels = report.submaps->levels;
-  TrackerLink::Value value;
-  int level = static_cast<int>(levels.size()) - 1;
-  if (report.values && findValue(*report.values, "submap_level", &value))
-    if (const auto* chosen = std::get_if<int>(&value)) level = std::min(level, *chosen);
-  const auto& shown = levels[static_cast<std::size_t>(std::max(level, 0))];
-  setText(submaps_text_,
-          QString("%1 submaps of %2 features at level %3 of 0 to %4, which keep %5 % "
-                  "of the information")
-              .arg(shown.submaps)
-              .arg(report.submaps->ids.size())
-              .arg(level)
-              .arg(levels.size() - 1)
-              .arg(100.0 * shown.preserved_chow_liu, 0, 'f', 0));
-}
-
-void TrackerPanel::showParameters(const TrackerReport& report) {
-  const auto values = report.is_there ? report.values : nullptr;
-  const auto description = report.is_there ? report.description : nullptr;
-  if (shows_parameters_ && values == shown_values_ && description == shown_description_) return;
-  shows_parameters_ = true;
-  shown_values_ = values;
-  shown_description_ = description;
-  for (const auto& field : fields_) field->show(description.get(), values.get());
-  showToggles(report);
-}
-
-/// One for every parameter of drawing that is on or off, whichever the tracker has.
-void TrackerPanel::showToggles(const TrackerReport& report) {
-  const auto* values = shown_values_.get();
-  std::vector<std::string> names;
-  if (values)
-    for (const auto& entry : values->bools)
-      if (entry.name.rfind(kDrawPrefix, 0) == 0) names.push_back(entry.name);
-  if (report.is_there && names != toggle_names_) {
-    toggle_names_ = names;
-    for (const auto& toggle : toggles_) toggle->widget()->deleteLater();
-    toggles_.clear();
-    for (const std::string& name : names) {
-      const QString label =
-          QString::fromStdString(name.substr(std::string(kDrawPrefix).size())).replace('_', ' ');
-      const int at = static_cast<int>(toggles_.size());
-      toggles_.push_back(
-          std::make_unique<ParameterField>(name, ParameterField::Kind::kToggle, label, drawing_,
-                                           [this](const std::string& parameter, const auto& value) {
-                                             link_.setParameter(parameter, value);
-                                           }));
-      toggle_grid_->addWidget(toggles_.back()->widget(), at / 2, at % 2);
-    }
-  }
-  for (const auto& toggle : toggles_) toggle->show(shown_description_.get(), values);
-}
-
-void TrackerPanel::showAnswer(const TrackerReport& report) {
-  QString text = QString::fromStdString(report.answer);
-  bool is_fault = report.is_refused;
-  // Sooner it would flicker.
-  if (!report.pending.empty() && report.pending_s > 1.0) {
-    text = QString("%1: no answer for %2 s")
-               .arg(QString::fromStdString(report.pending))
-               .arg(std::floor(report.pending_s), 0, 'f', 0);
-    is_fault = true;
-  }
-  setText(answer_, text);
-  answer_->setVisible(!text.isEmpty());
-  const QString style = is_fault ? "QLabel { color: #c62828; }" : "";
-  if (answer_->styleSheet() != style) answer_->setStyleSheet(style);
 }
 
 }  // namespace active_matching_slam

@@ -38,7 +38,7 @@ TEST(OneCamera, UnderAnotherNameIsFollowedAfterAPauseOrAJumpBack) {
   EXPECT_EQ(cameras.faultOf(headerOf("left", 5.0)), "");
 }
 
-sensor_msgs::CameraInfoConstPtr infoOf(double focal_px) {
+sensor_msgs::CameraInfoConstPtr infoWithFocal(double focal_px) {
   auto info = boost::make_shared<sensor_msgs::CameraInfo>();
   info->K[0] = info->K[4] = focal_px;
   return info;
@@ -46,23 +46,23 @@ sensor_msgs::CameraInfoConstPtr infoOf(double focal_px) {
 
 TEST(OneCalibration, IsKeptWhileAnotherComesByTurns) {
   OneCalibration calibration;
-  EXPECT_TRUE(calibration.take(infoOf(500.0), 0.0));
-  EXPECT_TRUE(calibration.take(infoOf(300.0), 0.03));  // may be a change
+  EXPECT_TRUE(calibration.take(infoWithFocal(500.0), 0.0));
+  EXPECT_TRUE(calibration.take(infoWithFocal(300.0), 0.03));  // may be a change
   const auto used = calibration.inUse();
   for (double now_s = 0.05; now_s < 5.0; now_s += 0.03) {
-    EXPECT_FALSE(calibration.take(infoOf(500.0), now_s));
-    EXPECT_TRUE(calibration.take(infoOf(300.0), now_s + 0.01));
+    EXPECT_FALSE(calibration.take(infoWithFocal(500.0), now_s));
+    EXPECT_TRUE(calibration.take(infoWithFocal(300.0), now_s + 0.01));
     EXPECT_EQ(calibration.inUse(), used);
   }
 }
 
 TEST(OneCalibration, ThatChangesIsTakenAtOnceAndAlsoBackAgain) {
   OneCalibration calibration;
-  calibration.take(infoOf(500.0), 0.0);
-  calibration.take(infoOf(300.0), 10.0);
+  calibration.take(infoWithFocal(500.0), 0.0);
+  calibration.take(infoWithFocal(300.0), 10.0);
   EXPECT_EQ(calibration.inUse()->K[0], 300.0);
-  for (double now_s = 10.0; now_s < 12.0; now_s += 0.03) calibration.take(infoOf(300.0), now_s);
-  EXPECT_TRUE(calibration.take(infoOf(500.0), 12.0));
+  for (double now_s = 10.0; now_s < 12.0; now_s += 0.03) calibration.take(infoWithFocal(300.0), now_s);
+  EXPECT_TRUE(calibration.take(infoWithFocal(500.0), 12.0));
   EXPECT_EQ(calibration.inUse()->K[0], 500.0);
 }
 

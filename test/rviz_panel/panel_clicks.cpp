@@ -75,6 +75,7 @@ class StoppedTracker {
   explicit StoppedTracker(const std::string& name) : node_(name), spinner_(1, &queue_) {
     node_.setCallbackQueue(&queue_);
     state_ = node_.advertise<ams_msgs::TrackingState>("state", 1, true);
+    statistics_ = node_.advertise<ams_msgs::MatchingStatistics>("statistics", 1, true);
     service_ = node_.advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
         "reset", [this](auto&, auto& response) {
           called_.set_value();
@@ -90,6 +91,10 @@ class StoppedTracker {
     return future_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
   }
   void answer() { may_answer_.set_value(); }
+  void tell(const ams_msgs::TrackingState& state, const ams_msgs::MatchingStatistics& statistics) {
+    state_.publish(state);
+    statistics_.publish(statistics);
+  }
 
  private:
   std::promise<void> called_, may_answer_;
@@ -97,7 +102,7 @@ class StoppedTracker {
   ros::CallbackQueue queue_;
   ros::NodeHandle node_;
   ros::AsyncSpinner spinner_;
-  ros::Publisher state_;
+  ros::Publisher state_, statistics_;
   ros::ServiceServer service_;
 };
 
@@ -176,6 +181,30 @@ TEST_F(PanelTest, AParameterThatTheTrackerHasNotIsGrey) {
   StoppedTracker tracker("/fake");
   EXPECT_TRUE(says("reason", "no image"));
   EXPECT_FALSE(find<QDoubleSpinBox>("map/features_per_frame")->isEnabled());
+  tracker.answer();
+}
+
+TEST_F(PanelTest, SubmapsThatAreLaidAsideAreCountedWhereThereAreAny) {
+  choose("/fake");
+  StoppedTracker tracker("/fake");
+  ams_msgs::TrackingState state;
+  state.state = ams_msgs::TrackingState::TRACKING;
+  state.state_name = "tracking";
+  ams_msgs::MatchingStatistics statistics;
+  statistics.features = 80;
+  tracker.tell(state, statistics);
+  EXPECT_TRUE(says("map", "80 features"));
+  EXPECT_FALSE(find<QLabel>("laid_aside")->isVisible());
+  statistics.submaps = 4;
+  statistics.frozen_features = 130;
+  statistics.trunk_features = 31;
+  statistics.submaps_found = 2;
+  statistics.loops = 1;
+  statistics.submap_lost_bits = 57.4;
+  tracker.tell(state, statistics);
+  EXPECT_TRUE(says("laid_aside", "4 submaps: 130 features, of which 31 separators; 57 bit"));
+  EXPECT_TRUE(says("laid_aside", "2 found again; 1 loop"));
+  EXPECT_TRUE(find<QLabel>("laid_aside")->isVisible());
   tracker.answer();
 }
 

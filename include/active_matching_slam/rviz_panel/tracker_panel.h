@@ -25,7 +25,9 @@ namespace active_matching_slam {
 /// A panel of rviz: how a tracker does, and what it can be asked for. Its name, what map file was
 /// named last and whether submaps are listened to are saved in rviz's configuration.
 ///
-/// Whatever waits for ROS does so in TrackerLink's threads; the panel looks at its report.
+/// What is asked for is in tracker_panel.cpp, what is shown in panel_display.cpp, in the words of
+/// report_text.h. Whatever waits for ROS does so in TrackerLink's threads; the panel looks at its
+/// report.
 class TrackerPanel : public rviz::Panel {
   Q_OBJECT
  public:
@@ -52,8 +54,8 @@ class TrackerPanel : public rviz::Panel {
   /// Ten times a second.
   void refresh();
   void showStatus(const TrackerReport& report);
-  void showStatistics(const TrackerReport& report);
-  void showSubmaps(const TrackerReport& report);
+  void setBadgeColor(const char* color);
+  void showNumbers(const TrackerReport& report);
   void showParameters(const TrackerReport& report);
   void showToggles(const TrackerReport& report);
   void showAnswer(const TrackerReport& report);
@@ -69,7 +71,8 @@ class TrackerPanel : public rviz::Panel {
   QTimer* timer_ = nullptr;
   QComboBox* name_ = nullptr;
   QLabel *badge_ = nullptr, *reason_ = nullptr, *scale_ = nullptr, *map_ = nullptr,
-         *matches_ = nullptr, *submaps_text_ = nullptr, *answer_ = nullptr;
+         *matches_ = nullptr, *laid_aside_title_ = nullptr, *laid_aside_ = nullptr,
+         *submaps_text_ = nullptr, *answer_ = nullptr;
   QProgressBar* quality_ = nullptr;
   QLineEdit* file_ = nullptr;
   QDoubleSpinBox* factor_ = nullptr;
