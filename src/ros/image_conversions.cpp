@@ -97,9 +97,14 @@ void checkDepthIsUsed(const sensor_msgs::ImageConstPtr& image) {
       !(encodings::isMono(encoding) || encodings::isColor(encoding) ||
         encodings::isBayer(encoding)))
     return;
+  const cv::Mat values = cv_bridge::toCvShare(image)->image.reshape(1);
   double most = 0.0;
-  cv::minMaxLoc(cv_bridge::toCvShare(image)->image.reshape(1), nullptr, &most);
-  if (most > 0.0 && most < kTwelveBits)
+  cv::minMaxLoc(values, nullptr, &most);
+  if (most >= kTwelveBits) return;
+  // Of a picture in the dark that was scaled up the lowest four bits are none.
+  cv::Mat lowest;
+  cv::bitwise_and(values, cv::Scalar(15), lowest);
+  if (cv::countNonZero(lowest) > 0)
     throw std::runtime_error("its largest value is " + std::to_string(static_cast<int>(most)) +
                              " of 65535: if the sensor has 12 bits or fewer, let its driver scale "
                              "them to 16, or send mono8");

@@ -91,6 +91,13 @@ TEST(ImageConversions, SixteenBitsOfWhichMostAreUnusedAreNamed) {
   }
 }
 
+TEST(ImageConversions, SixteenBitsInTheDarkAreAPicture) {
+  cv::Mat dark;
+  shadedImage().convertTo(dark, CV_16UC1, 16.0);
+  EXPECT_EQ("", faultOf([&] { toGrayImage(makeImage("mono16", dark)); }));
+  EXPECT_EQ("", faultOf([&] { toGrayImage(makeImage("mono16", dark * 0)); }));
+}
+
 TEST(ImageConversions, OfPackedChromaTheBrightnessIsTaken) {
   cv::Mat pairs;
   const cv::Mat chroma(shadedImage().size(), CV_8UC1, cv::Scalar(90));
