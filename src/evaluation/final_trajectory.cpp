@@ -114,8 +114,17 @@ std::optional<Isometry3d> resect(const std::vector<Vector3d>& points,
 }
 
 void FinalTrajectory::add(const TrackedFrame& frame) {
-  if (frame.map != map_) frames_.clear();
+  if (frame.map != map_) {
+    frames_.clear();
+    loops_.clear();
+  }
   map_ = frame.map;
+  while (static_cast<int>(loops_.size()) < frame.loops) loops_.push_back(frames_.size());
+  while (static_cast<int>(loops_.size()) > frame.loops) {
+    // Taken back: the map that was seen since is no more, and other features have its numbers.
+    for (std::size_t i = loops_.back(); i < frames_.size(); ++i) frames_[i].sightings.clear();
+    loops_.pop_back();
+  }
   if (frame.rescaled_by != 1.0)
     for (Frame& earlier : frames_) earlier.pose.T_world_camera.translation() *= frame.rescaled_by;
   positions_.clear();

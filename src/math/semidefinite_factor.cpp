@@ -20,6 +20,11 @@ SemidefiniteFactor::SemidefiniteFactor(const Eigen::Ref<const MatrixXd>& covaria
   for (Index i = 0; i < n; ++i) scale_(i) = std::sqrt(covariance(rows_[slot(i)], rows_[slot(i)]));
   MatrixXd correlation(n, n);
   for (Index k = 0; k < n; ++k) {
+    if (n == size_) {  // the same, in vector code
+      correlation.col(k).tail(n - k) =
+          covariance.col(k).tail(n - k).array() / (scale_.tail(n - k).array() * scale_(k));
+      continue;
+    }
     for (Index i = k; i < n; ++i) {
       correlation(i, k) = covariance(rows_[slot(i)], rows_[slot(k)]) / (scale_(i) * scale_(k));
     }
@@ -45,6 +50,10 @@ MatrixXd SemidefiniteFactor::halfSolve(const Eigen::Ref<const MatrixXd>& B) cons
   const Index n = static_cast<Index>(rows_.size());
   MatrixXd half(n, B.cols());
   for (Index k = 0; k < B.cols(); ++k) {
+    if (n == size_) {
+      half.col(k) = B.col(k).cwiseQuotient(scale_);
+      continue;
+    }
     for (Index i = 0; i < n; ++i) half(i, k) = B(rows_[slot(i)], k) / scale_(i);
   }
   if (n > 0) llt_.matrixL().solveInPlace(half);

@@ -221,7 +221,7 @@ bool SubmapKeeper::layAside(double stamp_s, Ekf* filter, FeatureMap* map) {
       static_cast<int>(tree_.trunk().ids().size()) >= options_.trunk_features)
     return false;
   const std::vector<FeatureId> resting = candidates(stamp_s, *filter, *map);
-  if (static_cast<int>(resting.size()) < kLeastLeaf) return false;
+  if (static_cast<int>(resting.size()) < std::max(kLeastLeaf, least_resting_)) return false;
   last_freeze_s_ = stamp_s;
   filter->convertToPoints(resting);  // what is laid aside are points
   const std::vector<FeatureId> chosen =
@@ -233,7 +233,10 @@ bool SubmapKeeper::layAside(double stamp_s, Ekf* filter, FeatureMap* map) {
   std::vector<FeatureId> points, out_of_view;
   for (const FeatureId id : chosen)
     if (std::find(separator.begin(), separator.end(), id) == separator.end()) points.push_back(id);
+  // The separator takes some of them: so many more will do.
+  least_resting_ = static_cast<int>(resting.size()) + kLeastLeaf - static_cast<int>(points.size());
   if (static_cast<int>(points.size()) < kLeastLeaf) return false;
+  least_resting_ = 0;
   for (const FeatureId id : separator)
     if (!filter->find(id) || isResting(id, stamp_s)) out_of_view.push_back(id);
   tree_.freeze(active, points, separator, out_of_view, cut);

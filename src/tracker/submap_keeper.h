@@ -153,6 +153,7 @@ class SubmapKeeper {
   std::map<int, Eigen::Isometry3d> looked_from_;  ///< in vain
   int looks_ = 0, next_in_turn_ = 0, next_sigma_ = 0;
   double last_freeze_s_ = -1e9, last_rest_s_ = -1e9;
+  int least_resting_ = 0;  ///< features out of view, for a submap to be cut of them
   int frozen_ = 0, found_ = 0;
   int found_where_predicted_ = 0, missed_where_predicted_ = 0;
 };

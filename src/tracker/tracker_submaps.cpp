@@ -28,10 +28,10 @@ constexpr std::int64_t kCarriedImages = 40;
 constexpr int kWatchedImages = 50;
 /// Of these, before it is judged. Cost: a wrong loop lasts so long.
 constexpr int kLeastWatchedImages = 10;
-/// Submaps that a closed loop predicts to be in view, missed one after the other, until it is taken
-/// back. Derivation: one in some is missed in a right map, hidden or changed, of three all together
-/// one in hundred times; in a wrong one nearly all are.
-constexpr int kMissedSubmaps = 3;
+/// A loop is taken back when submaps are missed where it predicts them so often that one in so many
+/// right loops would be. Cost: so rarely is a right one taken back; one that is wrong lasts a
+/// submap longer.
+constexpr double kMissedOdds = 100.0;
 /// Of what chance makes of an innovation. Cost: so rarely is a right loop refused.
 constexpr double kInnovationProbability = 0.9999;
 
@@ -167,8 +167,12 @@ bool Tracker::Implementation::watchLoop(TrackedFrame* frame) {
   if (!loop_undo_) return false;
   const SubmapKeeper& before = loop_undo_->submaps;
   const bool is_confirmed = submaps_.foundWherePredicted() > before.foundWherePredicted();
-  const bool is_missed = !is_confirmed && submaps_.missedWherePredicted() >=
-                                              before.missedWherePredicted() + kMissedSubmaps;
+  // In a wrong map all are missed; in a right one as many as before (Laplace's rule), by a
+  // sequential test of the one against the other (Wald 1945).
+  const double missed_share = (before.missedWherePredicted() + 1.0) /
+                              (before.missedWherePredicted() + before.foundWherePredicted() + 2.0);
+  const int missed = submaps_.missedWherePredicted() - before.missedWherePredicted();
+  const bool is_missed = !is_confirmed && -missed * std::log(missed_share) > std::log(kMissedOdds);
   bool is_contradicted = false;
   if (loop_undo_->images < kWatchedImages) {
     ++loop_undo_->images;

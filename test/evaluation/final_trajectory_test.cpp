@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "active_matching_slam/evaluation/run_report.h"
@@ -126,6 +127,20 @@ TEST(FinalTrajectory, AnotherUnitOfLengthCountsFromTheBeginning) {
   last.camera.position_world *= 2.0;
   for (TrackedFeature& feature : last.features) feature.position_world *= 2.0;
   for (StampedPose& pose : run.poses) pose.T_world_camera.translation() *= 2.0;
+  EXPECT_LT(run.error(run.finalPoses(), driftOf(0.0)), 1e-5);
+}
+
+TEST(FinalTrajectory, WhatWasSeenInAMapThatWasTakenBackDoesNotCount) {
+  DriftingRun run([](int i) { return driftOf(i >= 20 && i < 30 ? 0.5 : 0.0); });
+  for (int i = 20; i < 30; ++i) {
+    TrackedFrame& frame = run.frames[static_cast<std::size_t>(i)];
+    frame.loops = 1;
+    // Numbers that go to other features afterwards.
+    std::reverse(frame.features.begin(), frame.features.end());
+    for (std::size_t k = 0; k < frame.features.size(); ++k)
+      frame.features[k].id = static_cast<FeatureId>(k);
+    frame.camera.setPoseWorldCamera(run.poses[static_cast<std::size_t>(i)].T_world_camera);
+  }
   EXPECT_LT(run.error(run.finalPoses(), driftOf(0.0)), 1e-5);
 }
 

@@ -35,6 +35,7 @@ class FinalTrajectory {
   std::vector<Frame> frames_;
   std::unordered_map<FeatureId, Eigen::Vector3d> positions_;  ///< in the last frame
   int map_ = -1;
+  std::vector<std::size_t> loops_;  ///< frames before each that was closed and not taken back
 };
 
 /// The camera that sees `points` in `directions` (unit, camera's frame), from near `start`: least
