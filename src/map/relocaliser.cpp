@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <opencv2/calib3d.hpp>
+#include <random>
 #include <utility>
 
 #include "active_matching_slam/image/image_feature_search.h"
@@ -116,8 +116,7 @@ double Relocaliser::stepMs(const std::vector<Landmark>& landmarks, const CameraL
                  landmarks.size() - std::min(look.landmark_, landmarks.size()), kLandmarksOfStep)) *
              (kDescribeMs + kPairMs * static_cast<double>(look.corners_->points().pixels.size()));
     case CameraLook::Stage::kConsensus:
-      return kDrawsOfStep *
-             (kDrawMs + kVoteOfDrawMs * static_cast<double>(look.sightings_.size()));
+      return kDrawsOfStep * (kDrawMs + kVoteOfDrawMs * static_cast<double>(look.sightings_.size()));
     default:
       return 0.0;
   }
@@ -241,8 +240,9 @@ void Relocaliser::matchDescriptors(const std::vector<Landmark>& landmarks, Camer
   }
 }
 
-/// Landmarks that are known no more drop out. Draws until three right ones have been drawn as surely as by kRansacIterations where few are
-/// right. Every step draws from another order, as each begins with the same random numbers.
+/// Landmarks that are known no more drop out. Draws until three right ones have been drawn as
+/// surely as by kRansacIterations where few are right. Every step draws from another order, as each
+/// begins with the same random numbers.
 void Relocaliser::drawConsensus(const CameraModel& camera, const std::vector<Landmark>& landmarks,
                                 CameraLook* look) const {
   std::vector<Sighting> sightings;
@@ -258,9 +258,8 @@ void Relocaliser::drawConsensus(const CameraModel& camera, const std::vector<Lan
   }
   const double right =
       static_cast<double>(look->inliers_) / std::max<double>(1.0, double(sightings.size()));
-  const double needed = right < 1.0 ? std::log(1.0 - kDrawnProbability) /
-                                          std::log1p(-right * right * right)
-                                    : 0.0;
+  const double needed =
+      right < 1.0 ? std::log(1.0 - kDrawnProbability) / std::log1p(-right * right * right) : 0.0;
   if (look->draws_ < kRansacIterations && !(look->draws_ >= needed)) return;
   look->T_world_camera_ = look->best_;
   look->stage_ = CameraLook::Stage::kOver;
@@ -286,8 +285,8 @@ std::optional<Relocaliser::Consensus> Relocaliser::solvePose(const CameraModel& 
   cv::Vec3d rotation, translation;
   std::vector<int> inliers;
   try {  // its random numbers start from a fixed seed at every call
-    if (!cv::solvePnPRansac(points, ideal, K, cv::noArray(), rotation, translation, false,
-                            draws, kRansacPx, kDrawnProbability, inliers, cv::SOLVEPNP_P3P))
+    if (!cv::solvePnPRansac(points, ideal, K, cv::noArray(), rotation, translation, false, draws,
+                            kRansacPx, kDrawnProbability, inliers, cv::SOLVEPNP_P3P))
       return std::nullopt;
   } catch (const cv::Exception&) {  // degenerate points
     return std::nullopt;

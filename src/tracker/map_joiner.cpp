@@ -15,7 +15,10 @@ namespace {
 
 /// Distance in the image within which two landmarks are taken to be at one depth, of an image 640
 /// wide [px]. Cost: farther, more of them lie on other surfaces, which shows in the scatter.
-constexpr double kNeighbourPx = 40.0;
+constexpr double kNeighbourPx = 80.0;
+/// Relative standard deviation of an inverse depth that is compared. Derivation: infinity is five
+/// sigma away.
+constexpr double kMostDepthSigma = 0.2;
 /// Derivation: the fewest whose median two outliers can't move away.
 constexpr std::size_t kLeastNeighbours = 5;
 /// Of the standard deviation of a Gaussian, its median absolute deviation, and of the mean's the
@@ -84,8 +87,9 @@ std::optional<UnitRatio> unitRatio(const CameraModel& camera, const Ekf& map, co
   std::vector<Seen> seen;
   const Eigen::Isometry3d T_camera_other = other.camera().poseWorldCamera().inverse();
   for (const FeatureState& feature : other.features()) {
-    if (feature.kind != FeatureKind::kPoint) continue;
-    const Eigen::Vector3d point = T_camera_other * feature.point_world;
+    if (other.sigmaInverseDepth(feature) > kMostDepthSigma * std::abs(feature.inverse_depth))
+      continue;
+    const Eigen::Vector3d point = T_camera_other * feature.position();
     const auto pixel = camera.project(point);
     if (pixel && camera.isInImage(*pixel)) seen.push_back({&feature, *pixel, point.norm()});
   }
@@ -99,9 +103,10 @@ std::optional<UnitRatio> unitRatio(const CameraModel& camera, const Ekf& map, co
   for (const FeatureMeasurement& sight : sights) {
     const FeatureState* feature = map.find(sight.id);
     if (!feature || seen.empty()) continue;
-    const auto nearest = std::min_element(seen.begin(), seen.end(), [&](const Seen& a, const Seen& b) {
-      return (a.pixel - sight.pixel).squaredNorm() < (b.pixel - sight.pixel).squaredNorm();
-    });
+    const auto nearest =
+        std::min_element(seen.begin(), seen.end(), [&](const Seen& a, const Seen& b) {
+          return (a.pixel - sight.pixel).squaredNorm() < (b.pixel - sight.pixel).squaredNorm();
+        });
     const double distance = (feature->position() - map.camera().position_world).norm();
     if ((nearest->pixel - sight.pixel).norm() > radius_px || !(distance > 0.0)) continue;
     pairs.push_back({feature, nearest->feature, std::log(distance / nearest->distance)});
@@ -147,58 +152,88 @@ bool agree(const CameraModel& camera, const Ekf& map, const Relocalisation& firs
              chiSquareQuantile(kFreedoms, kAgreementProbability);
 }
 
-JoinedPoints joinPoints(const Ekf& other, const std::vector<FeatureId>& ids, const UnitRatio& unit,
-                        Ekf* filter) {
-  JoinedPoints joined;
+JoinedFeatures joinFeatures(const Ekf& other, const std::vector<FeatureId>& ids,
+                            const UnitRatio& unit, Ekf* filter) {
+  JoinedFeatures joined;
   joined.factor = unit.factor;
   const Eigen::Isometry3d T_map_camera = filter->camera().poseWorldCamera();
   Eigen::Isometry3d T_camera_other = other.camera().poseWorldCamera().inverse();
   T_camera_other.translation() *= unit.factor;
   joined.T_map_other = T_map_camera * T_camera_other;
-  std::vector<const FeatureState*> points;
+  const Eigen::Matrix3d R = joined.T_map_other.linear();
+  std::vector<const FeatureState*> sources;
   for (const FeatureId id : ids) {
     const FeatureState* feature = other.find(id);
-    if (!feature || feature->kind != FeatureKind::kPoint) continue;
+    if (!feature || !(homogeneousPosition(*feature).w() > 0.0)) continue;
     joined.ids.push_back(id);
-    points.push_back(feature);
+    sources.push_back(feature);
   }
-  const auto rows = 3 * static_cast<Eigen::Index>(points.size());
-  // By errors: of the filter's camera, of the ratio's logarithm, and of the other map's state, of
-  // which first the covariance of all of it with the points.
-  Eigen::MatrixXd of_camera(rows, 6);
-  Eigen::VectorXd of_unit(rows);
+  constexpr int kSize = 6;  // of a feature's error, as of that of a camera's pose
+  const auto rows = kSize * static_cast<Eigen::Index>(sources.size());
+  // Of errors of the other map, first their covariance with all of that map.
   const auto P_other = other.covariance();
+  std::vector<Eigen::Matrix<double, kSize, Eigen::Dynamic>> by_other;
+  std::vector<std::vector<int>> columns;
   Eigen::MatrixXd others(rows, P_other.cols());
+  Eigen::MatrixXd of_camera = Eigen::MatrixXd::Zero(rows, kSize);
+  Eigen::VectorXd of_unit = Eigen::VectorXd::Zero(rows);
   std::vector<FeatureState> features = filter->features();
   FeatureId next_id = std::max(filter->nextId(), other.nextId());
-  const Eigen::Matrix3d A = unit.factor * joined.T_map_other.linear();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto row = 3 * static_cast<Eigen::Index>(i);
-    const Eigen::Vector3d ray_other = points[i]->point_world - other.camera().position_world;
-    const Eigen::Vector3d ray = A * ray_other;
-    others.middleRows<3>(row) =
-        A * (P_other.middleRows<3>(points[i]->offset) -
-             P_other.middleRows<3>(CameraError::kPosition) +
-             skew(ray_other) * P_other.middleRows<3>(CameraError::kRotation));
-    of_camera.middleRows<3>(row) << Eigen::Matrix3d::Identity(), -skew(ray);
-    of_unit.segment<3>(row) = ray;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const auto row = kSize * static_cast<Eigen::Index>(i);
+    const FeatureState& source = *sources[i];
+    const Eigen::Vector4d point = homogeneousPosition(source);
+    const double w = point.w();
+    const Eigen::Vector3d h = point.head<3>() - w * other.camera().position_world;
+    const Eigen::Vector3d g = R * h;
+    const double length = g.norm();
     FeatureState feature;
     feature.id = next_id++;
-    feature.kind = FeatureKind::kPoint;
-    feature.point_world = T_map_camera.translation() + ray;
+    feature.kind = FeatureKind::kInverseDepth;
+    feature.anchor_world = T_map_camera.translation();
+    feature.bearing_world = g / length;
+    feature.tangent_world = feature.bearing_world.unitOrthogonal();
+    feature.inverse_depth = w / (unit.factor * length);
+    // Bearing and inverse depth by g, and by w.
+    Eigen::Matrix3d D;
+    D << feature.tangentBasis().transpose() / length,
+        -feature.inverse_depth / length * feature.bearing_world.transpose();
+    const Eigen::Vector3d by_w(0.0, 0.0, 1.0 / (unit.factor * length));
+    // By errors of the other camera's position and rotation, and of the other feature.
+    Eigen::Matrix<double, kSize, Eigen::Dynamic> J =
+        Eigen::Matrix<double, kSize, Eigen::Dynamic>::Zero(kSize, kSize + source.size());
+    J.block<3, 3>(3, 0) = -w * D * R;
+    J.block<3, 3>(3, 3) = D * R * skew(h);
+    if (source.kind == FeatureKind::kPoint) {
+      J.block<3, 3>(3, kSize) = D * R;
+    } else {
+      const int bearing = kSize + (source.hasAnchorError() ? 3 : 0);
+      if (source.hasAnchorError()) J.block<3, 3>(3, kSize) = w * D * R;
+      J.block<3, 2>(3, bearing) = D * R * source.tangentBasis();
+      J.col(bearing + 2).tail<3>() =
+          D * R * (source.anchor_world - other.camera().position_world) + by_w;
+    }
+    std::vector<int> own;
+    for (int k = 0; k < kSize; ++k) own.push_back(CameraError::kPosition + k);
+    for (int k = 0; k < source.size(); ++k) own.push_back(source.offset + k);
+    others.middleRows<kSize>(row).setZero();
+    for (std::size_t k = 0; k < own.size(); ++k)
+      others.middleRows<kSize>(row) += J.col(static_cast<Eigen::Index>(k)) * P_other.row(own[k]);
+    of_camera.block<3, 3>(row, CameraError::kPosition).setIdentity();
+    of_camera.block<3, 3>(row + 3, CameraError::kRotation) = -D * skew(g);
+    of_unit[row + 5] = -feature.inverse_depth;
+    by_other.push_back(std::move(J));
+    columns.push_back(std::move(own));
     features.push_back(feature);
   }
   const Eigen::MatrixXd P = filter->savedCovariance();
-  const Eigen::MatrixXd cross = of_camera * P.topRows<6>();
-  Eigen::MatrixXd own = cross.leftCols<6>() * of_camera.transpose();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d ray_other = points[i]->point_world - other.camera().position_world;
-    own.middleCols<3>(3 * static_cast<Eigen::Index>(i)) +=
-        (others.middleCols<3>(points[i]->offset) - others.middleCols<3>(CameraError::kPosition) -
-         others.middleCols<3>(CameraError::kRotation) * skew(ray_other)) *
-        A.transpose();
-  }
+  const Eigen::MatrixXd cross = of_camera * P.topRows<kSize>();
+  Eigen::MatrixXd own = cross.leftCols<kSize>() * of_camera.transpose();
   own += unit.log_sigma * unit.log_sigma * of_unit * of_unit.transpose();
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    for (std::size_t k = 0; k < columns[i].size(); ++k)
+      own.middleCols<kSize>(kSize * static_cast<Eigen::Index>(i)) +=
+          others.col(columns[i][k]) * by_other[i].col(static_cast<Eigen::Index>(k)).transpose();
   Eigen::MatrixXd all(P.rows() + rows, P.cols() + rows);
   all << P, cross.transpose(), cross, 0.5 * (own + own.transpose());
   filter->restore(filter->camera(), features, all, next_id);

@@ -31,8 +31,8 @@ bool agree(const CameraModel& camera, const Ekf& map, const Relocalisation& firs
            const Relocalisation& second, const Eigen::Isometry3d& T_first_second,
            const UnitRatio& unit);
 
-/// Points of another map for a filter.
-struct JoinedPoints {
+/// Features of another map in a filter.
+struct JoinedFeatures {
   std::vector<FeatureId> ids;  ///< in the other map; in the filter they have new ones, ascending
   Eigen::Isometry3d T_map_other = Eigen::Isometry3d::Identity();  ///< after multiplying by factor
   double factor = 1.0;
@@ -44,12 +44,12 @@ struct JoinedPoints {
   }
 };
 
-/// Adds points `ids` of another map to a filter. The two cameras are one: what is known of a point
-/// in relation to the other's camera is taken to that of the filter, with all that is unknown of
-/// both cameras, of the other map and of the ratio of units. What the maps have in common but the
-/// camera, the calibration, is left out. The first new id is that which nextId() was or the
-/// other's, whichever is larger.
-JoinedPoints joinPoints(const Ekf& other, const std::vector<FeatureId>& ids, const UnitRatio& unit,
-                        Ekf* filter);
+/// Adds features `ids` of another map to a filter, as seen from its camera now (inverse depth). The
+/// two cameras are one: what is known of a feature in relation to the other's camera is taken to
+/// that of the filter, with all that is unknown of both cameras, of the other map and of the ratio
+/// of units. What the maps have in common but the camera, the calibration, is left out. The first
+/// new id is that which nextId() was or the other's, whichever is larger.
+JoinedFeatures joinFeatures(const Ekf& other, const std::vector<FeatureId>& ids,
+                            const UnitRatio& unit, Ekf* filter);
 
 }  // namespace active_matching_slam

@@ -235,9 +235,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     const bool is_gap = interval_s > options_.max_frame_interval_s && !isTranslationKnown();
     if (is_gap) endLook();
     const bool is_due = is_gap || poor_frames_ >= kRelocalisationPeriodFrames;
-    if (!is_due ||
-        !lookWhileLost(used, is_gap ? LookBudget::kWhole : LookBudget::kHalf, interval_s,
-                       frame.get()))
+    if (!is_due || !lookWhileLost(used, is_gap ? LookBudget::kWhole : LookBudget::kHalf, interval_s,
+                                  frame.get()))
       current.emplace(follow(used, interval_s, frame.get()));
   }
   previous_image_ = mask_.isWhole() ? image.clone() : used;  // the caller may reuse its memory

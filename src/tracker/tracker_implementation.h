@@ -220,7 +220,7 @@ class Tracker::Implementation {
   bool lookForOtherMaps(const cv::Mat& image, double interval_s, TrackedFrame* frame);
   bool confirmOtherMap(const cv::Mat& image, TrackedFrame* frame);
   bool joinMaps(const Place& place, const Relocalisation& found, TrackedFrame* frame);
-  void takePoints(const Ekf& other, const FeatureMap& other_map, const UnitRatio& unit);
+  void takeFeatures(const Ekf& other, const FeatureMap& other_map, const UnitRatio& unit);
   int lostMapIndex(int number) const;
 
   LostMap storeMap();

@@ -31,10 +31,9 @@ constexpr double kMostUnitSigma = 0.2;
 /// Of a frame's time for matching, modelled: so it is the same on every machine.
 double Tracker::Implementation::lookMilliseconds(LookBudget share, double interval_s) const {
   if (!(options_.matching.max_milliseconds > 0.0)) return std::numeric_limits<double>::infinity();
-  const double whole =
-      options_.matching.max_milliseconds *
-      std::max(1.0, options_.cascade.budget_rate_hz *
-                        std::min(interval_s, options_.max_frame_interval_s));
+  const double whole = options_.matching.max_milliseconds *
+                       std::max(1.0, options_.cascade.budget_rate_hz *
+                                         std::min(interval_s, options_.max_frame_interval_s));
   switch (share) {
     case LookBudget::kQuarter:
       return 0.25 * whole;
@@ -61,8 +60,8 @@ void Tracker::Implementation::endPlace() {
 void Tracker::Implementation::beginLook(OngoingLook::Purpose purpose, const cv::Mat& image,
                                         std::vector<Place> places) {
   if (places.empty()) return;
-  look_ = OngoingLook{purpose,       CameraLook(image.clone(), mask_),   std::move(places),
-                      last_stamp_s_, filter_.camera().poseWorldCamera()};
+  look_ = OngoingLook{purpose, CameraLook(image.clone(), mask_), std::move(places), last_stamp_s_,
+                      filter_.camera().poseWorldCamera()};
 }
 
 int Tracker::Implementation::lostMapIndex(int number) const {
@@ -134,8 +133,7 @@ bool Tracker::Implementation::lookWhileLost(const cv::Mat& image, LookBudget sha
     const std::vector<Landmark> landmarks = landmarksOf(place);
     spent_ms += Relocaliser::proofMs(landmarks);
     const cv::Mat searched = look_->look.image();
-    const auto found =
-        relocaliser_.prove(camera_, searched, landmarks, *pose, look_->look.mask());
+    const auto found = relocaliser_.prove(camera_, searched, landmarks, *pose, look_->look.mask());
     const double stamp_s = look_->stamp_s;
     const Eigen::Isometry3d T_world_camera = look_->T_world_camera;
     endPlace();
@@ -172,8 +170,7 @@ std::optional<Relocalisation> Tracker::Implementation::findNear(const Sighting& 
   reference_index_ = -1;
   T_world_reference_ = filter_.camera().poseWorldCamera();
   poor_frames_ = 0;
-  predicted_interval_s_ =
-      std::min(last_stamp_s_ - sighting.stamp_s, options_.max_frame_interval_s);
+  predicted_interval_s_ = std::min(last_stamp_s_ - sighting.stamp_s, options_.max_frame_interval_s);
   filter_.predict(predicted_interval_s_, motion_noise_.widest());
   FrameState current = measure(image, interval_s);
   MatchOptions matching = options_.matching;  // the time of this frame, not of all since then
@@ -276,8 +273,7 @@ bool Tracker::Implementation::confirmOtherMap(const cv::Mat& image, TrackedFrame
   Ekf then = lost.filter, here = filter_;
   relocateByInliers(sighting.found, &then);
   CameraState camera = here.camera();
-  const Eigen::Isometry3d T_then_now =
-      sighting.T_world_camera.inverse() * camera.poseWorldCamera();
+  const Eigen::Isometry3d T_then_now = sighting.T_world_camera.inverse() * camera.poseWorldCamera();
   camera.setPoseWorldCamera(sighting.T_world_camera);
   here.relocateCamera(camera, here.cameraCovariance());
   const auto unit = unitRatio(camera_, then, here, sighting.found.inliers);
@@ -289,17 +285,13 @@ bool Tracker::Implementation::confirmOtherMap(const cv::Mat& image, TrackedFrame
     if (++sighting.images < kMostConfirmingImages) sighting_ = std::move(sighting);
     return false;
   }
-  if (!unit) {
-    goOnIn(sighting.place, *found, frame);
-    return true;
-  }
-  if (!agree(camera_, lost.filter, sighting.found, *found, T_then_now, *unit)) return false;
+  if (unit && !agree(camera_, lost.filter, sighting.found, *found, T_then_now, *unit)) return false;
   return joinMaps(sighting.place, *found, frame);
 }
 
 /// Makes one of the map in hand and another, in which the camera was found in this image: what the
 /// newer one holds goes into the older, whose world and unit stay. Where they can't be joined, the
-/// camera goes on in the one found. Whether it goes on in another map.
+/// camera goes on in the older one. Whether that is another map.
 bool Tracker::Implementation::joinMaps(const Place& place, const Relocalisation& found,
                                        TrackedFrame* frame) {
   const auto k = static_cast<std::size_t>(lostMapIndex(place.number));
@@ -308,13 +300,12 @@ bool Tracker::Implementation::joinMaps(const Place& place, const Relocalisation&
   const bool is_older = place.number < map_number_;
   const Ekf& newer = is_older ? filter_ : other;
   const SubmapKeeper& newer_submaps = is_older ? submaps_ : lost_maps_[k].submaps;
-  std::vector<FeatureMeasurement> sights = found.inliers;
-  auto unit = unitRatio(camera_, other, filter_, sights);
+  auto unit = unitRatio(camera_, other, filter_, found.inliers);
   if (unit && !is_older) unit->factor = 1.0 / unit->factor;
   if (!options_.mapping || !unit || unit->log_sigma > kMostUnitSigma ||
       initialiser_.areDepthsGuessed() || !newer_submaps.tree().empty()) {
-    goOnIn(place, found, frame);
-    return true;
+    if (is_older) goOnIn(place, found, frame);
+    return is_older;
   }
   const Ekf newer_filter = newer;
   const FeatureMap newer_map = is_older ? map_ : lost_maps_[k].map;
@@ -328,7 +319,7 @@ bool Tracker::Implementation::joinMaps(const Place& place, const Relocalisation&
     ++map_epoch_;
   }
   lost_maps_.erase(lost_maps_.begin() + static_cast<std::ptrdiff_t>(k));
-  takePoints(newer_filter, newer_map, *unit);
+  takeFeatures(newer_filter, newer_map, *unit);
   std::ostringstream reason;
   reason << "map " << newer_number << " joined with map " << map_number_ << ": its lengths times "
          << unit->factor;
@@ -336,10 +327,10 @@ bool Tracker::Implementation::joinMaps(const Place& place, const Relocalisation&
   return is_older;
 }
 
-/// Points of another map, as many as there is room for: those in view first, and none beside one
+/// Features of another map, as many as there is room for: those in view first, and none beside one
 /// that is in the map.
-void Tracker::Implementation::takePoints(const Ekf& other, const FeatureMap& other_map,
-                                         const UnitRatio& unit) {
+void Tracker::Implementation::takeFeatures(const Ekf& other, const FeatureMap& other_map,
+                                           const UnitRatio& unit) {
   const double distance_px =
       0.5 * options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
   std::vector<Eigen::Vector2d> occupied;
@@ -351,13 +342,14 @@ void Tracker::Implementation::takePoints(const Ekf& other, const FeatureMap& oth
   const Eigen::Isometry3d T_camera_other = other.camera().poseWorldCamera().inverse();
   for (const MapFeature& feature : other_map.features()) {
     const FeatureState* state = other.find(feature.id);
-    if (!state || state->kind != FeatureKind::kPoint) continue;
-    const auto pixel = camera_.project(T_camera_other * state->point_world);
+    if (!state) continue;
+    const Eigen::Vector4d point = homogeneousPosition(*state);
+    const auto pixel = camera_.project(T_camera_other.linear() * point.head<3>() +
+                                       point.w() * T_camera_other.translation());
     const bool is_in_view = pixel && camera_.isInImage(*pixel);
     const bool is_beside =
-        is_in_view && std::any_of(occupied.begin(), occupied.end(), [&](const auto& p) {
-          return (p - *pixel).norm() < distance_px;
-        });
+        is_in_view && std::any_of(occupied.begin(), occupied.end(),
+                                  [&](const auto& p) { return (p - *pixel).norm() < distance_px; });
     if (!is_beside) candidates.emplace_back(!is_in_view, feature.id);
   }
   std::stable_sort(candidates.begin(), candidates.end(),
@@ -372,7 +364,7 @@ void Tracker::Implementation::takePoints(const Ekf& other, const FeatureMap& oth
   std::vector<FeatureId> ids;
   for (const auto& candidate : candidates) ids.push_back(candidate.second);
   std::sort(ids.begin(), ids.end());
-  const JoinedPoints joined = joinPoints(other, ids, unit, &filter_);
+  const JoinedFeatures joined = joinFeatures(other, ids, unit, &filter_);
   FeatureId new_id = filter_.nextId() - static_cast<FeatureId>(joined.ids.size());
   for (const FeatureId id : joined.ids) {
     MapFeature feature = *other_map.find(id);

@@ -112,10 +112,14 @@ void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, double i
     abandonMap(reason.str());
     return;
   }
-  if (lookWhileLost(image, LookBudget::kWhole, interval_s, frame)) return;
-  if (options_.mapping && options_.new_map_when_lost_after_s > 0.0 &&
-      lost_s >= options_.new_map_when_lost_after_s && !awaits_loaded_map_ && !is_pose_given_)
-    beginNewMap(image, frame);
+  const bool is_new_map_due = options_.mapping && options_.new_map_when_lost_after_s > 0.0 &&
+                              lost_s >= options_.new_map_when_lost_after_s && !awaits_loaded_map_ &&
+                              !is_pose_given_;
+  const bool is_time_shared = is_new_map_due || is_pose_given_;
+  if (lookWhileLost(image, is_time_shared ? LookBudget::kHalf : LookBudget::kWhole, interval_s,
+                    frame))
+    return;
+  if (is_new_map_due) beginNewMap(image, frame);
 }
 
 Tracker::Implementation::LostMap Tracker::Implementation::storeMap() {

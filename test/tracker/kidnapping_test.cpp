@@ -276,8 +276,8 @@ TEST(Kidnapping, ALookTakesSomeFramesAndTheCameraIsFoundWhereItHasGoneMeanwhile)
 
 TEST(Kidnapping, TwoMapsOfARoomAreJoinedWhenOneIsRecognisedFromTheOther) {
   // One side of the view, the dark, the other side, and then all of it.
-  constexpr int kHalf = 70, kDark = 20, kOtherHalf = 90, kAll = 60;
-  const Film film = makeFilm(filmOptions((kHalf + kDark + kOtherHalf + kAll + 1) / 30.0));
+  constexpr int kSide = 60, kDark = 20, kOtherSide = 70, kAll = 90;
+  const Film film = makeFilm(filmOptions((kSide + kDark + kOtherSide + kAll + 1) / 30.0));
   const auto side = [](int left) {
     cv::Mat mask(240, 320, CV_8UC1, cv::Scalar(0));
     mask.colRange(left, left + 120).setTo(255);
@@ -286,25 +286,23 @@ TEST(Kidnapping, TwoMapsOfARoomAreJoinedWhenOneIsRecognisedFromTheOther) {
   TrackerOptions options;
   options.new_map_when_lost_after_s = 0.1;
   Tracker tracker(film.camera, options);
-  tracker.setMask(side(0));
-  const Frames before = trackFrames(film, &tracker, 0, kHalf);
+  tracker.setMask(side(200));
+  const Frames before = trackFrames(film, &tracker, 0, kSide);
   EXPECT_EQ(before.back()->state, TrackingState::kTracking);
-  for (int i = kHalf; i < kHalf + kDark; ++i) {
+  for (int i = kSide; i < kSide + kDark; ++i) {
     cv::Mat dark(240, 320, CV_8UC1, cv::Scalar(0));
     dark.at<std::uint8_t>(100, i) = 10;
     tracker.track(dark, film.frames[i].stamp_s);
   }
-  tracker.setMask(side(200));
-  const int other = kHalf + kDark, all = other + kOtherHalf;
+  tracker.setMask(side(0));
+  const int other = kSide + kDark, all = other + kOtherSide;
   const Frames beside = trackFrames(film, &tracker, other, all);
   ASSERT_EQ(beside.back()->state, TrackingState::kTracking);
-  for (const auto& f : beside) std::cout << f->index << " " << f->map << " " << trackingStateName(f->state) << " " << f->reason << "\n";
   ASSERT_EQ(beside.back()->map, 1) << "nothing of the first map is in view";
   tracker.setMask(cv::Mat());
   const Frames after = trackFrames(film, &tracker, all, all + kAll);
-  for (const auto& f : after) std::cout << f->index << " " << f->map << " " << trackingStateName(f->state) << " " << f->reason << "\n";
-  const auto joined = std::find_if(after.begin(), after.end(),
-                                   [](const auto& frame) { return frame->map == 0; });
+  const auto joined =
+      std::find_if(after.begin(), after.end(), [](const auto& frame) { return frame->map == 0; });
   ASSERT_NE(joined, after.end());
   const TrackedFrame& at = **joined;
   const TrackedFrame& one_before = joined == after.begin() ? *beside.back() : **(joined - 1);
@@ -323,7 +321,8 @@ TEST(Kidnapping, TwoMapsOfARoomAreJoinedWhenOneIsRecognisedFromTheOther) {
   ASSERT_LT(next, after.end());
   int matched_left = 0, matched_right = 0;
   for (const TrackedFeature& feature : (*next)->features)
-    if (feature.status == FeatureStatus::kMatched) ++(feature.matched_px.x() < 160.0 ? matched_left : matched_right);
+    if (feature.status == FeatureStatus::kMatched)
+      ++(feature.matched_px.x() < 160.0 ? matched_left : matched_right);
   EXPECT_GE(matched_left, 10);
   EXPECT_GE(matched_right, 10);
   const auto first = static_cast<int>(joined - after.begin());

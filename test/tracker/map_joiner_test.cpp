@@ -6,6 +6,7 @@
 #include <iostream>
 #include <random>
 
+#include "active_matching_slam/filter/state_error.h"
 #include "active_matching_slam/math/rotation.h"
 #include "active_matching_slam/simulation/simulator.h"
 
@@ -15,11 +16,17 @@ namespace {
 /// Of the other map's world and unit: a point x of the one is at unit * (turned x + shift) there.
 constexpr double kOtherUnit = 1.6;
 
+FilterOptions allBecomePoints() {
+  FilterOptions options;
+  options.linearity_threshold = 100.0;
+  return options;
+}
+
 /// Two maps of one wall of relief, made independently, each of points of its own, and the two
 /// filters' cameras, found by the noisy pixels of one image.
 struct TwoMaps {
   CameraModel camera{makeSimulatedCalibration(640, 480, "none")};
-  Ekf map{FilterOptions()}, other{FilterOptions()};
+  Ekf map{allBecomePoints()}, other{allBecomePoints()};
   Eigen::Isometry3d T_map_camera = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_other_map = Eigen::Isometry3d::Identity();  ///< lengths then times unit
   std::vector<FeatureMeasurement> sights;                         ///< of the map's points
@@ -84,8 +91,9 @@ struct JoinedErrors {
 JoinedErrors joinedErrors(const TwoMaps& maps, const UnitRatio& unit) {
   Ekf filter = maps.map;
   const int first = filter.stateSize();
-  const JoinedPoints joined = joinPoints(maps.other, maps.others, unit, &filter);
+  const JoinedFeatures joined = joinFeatures(maps.other, maps.others, unit, &filter);
   const auto n = static_cast<Eigen::Index>(joined.ids.size());
+  EXPECT_EQ(filter.convertToPoints().size(), joined.ids.size());
   EXPECT_EQ(joined.ids, maps.others);
   Eigen::VectorXd error(3 * n);
   JoinedErrors errors;
@@ -145,12 +153,72 @@ TEST(MapJoiner, JoinedPointsAreAsFarOffAsTheirCovarianceSays) {
             << mean.all << ", by a wrong unit " << each_by_wrong_unit << "\n";
 }
 
+/// Rays and a point, seen from where the camera is no more.
+Ekf mapOfRays(const CameraModel& camera) {
+  Ekf map{FilterOptions()};
+  CameraState start;
+  start.velocity_world = {0.6, -0.3, 0.2};
+  start.angular_velocity_camera = {0.1, -0.2, 0.1};
+  map.reset(start, 1e-4 * MotionCovariance::Identity());
+  map.addInverseDepthFeature(camera, {200.0, 150.0}, 0.4, 0.1);
+  map.predict(0.5);
+  map.addInverseDepthFeature(camera, {400.0, 300.0}, 0.5, 0.2);
+  map.addPointFeature({0.4, 0.2, 2.5}, 1e-3 * Eigen::Matrix3d::Identity());
+  map.predict(0.5);
+  return map;
+}
+
+TEST(MapJoiner, FirstOrderErrorsAreThoseOfMapsThatDifferALittle) {
+  const CameraModel camera(makeSimulatedCalibration(640, 480, "none"));
+  const Ekf other = mapOfRays(camera);
+  const UnitRatio unit{1.7, 0.0};
+  std::vector<FeatureId> ids;
+  for (const FeatureState& feature : other.features()) ids.push_back(feature.id);
+  CameraState place;
+  place.setPoseWorldCamera(TwoMaps(1).T_map_camera);
+  const auto join = [&](const Ekf& map) {
+    Ekf filter{FilterOptions()};
+    filter.reset(place, 1e-18 * MotionCovariance::Identity());
+    joinFeatures(map, ids, unit, &filter);
+    return filter;
+  };
+  const Ekf joined = join(other);
+  ASSERT_EQ(joined.features().size(), ids.size());
+  Eigen::MatrixXd J(3 * ids.size(), other.stateSize());
+  constexpr double kStep = 1e-6;
+  for (int column = 0; column < other.stateSize(); ++column) {
+    Eigen::VectorXd delta = Eigen::VectorXd::Zero(other.stateSize());
+    delta[column] = kStep;
+    CameraState moved = other.camera();
+    std::vector<FeatureState> features = other.features();
+    applyError(delta, moved, features);
+    Ekf differing = other;
+    differing.restore(moved, features, other.savedCovariance(), other.nextId());
+    const Ekf result = join(differing);
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      const FeatureState &was = joined.features()[i], &is = result.features()[i];
+      const auto row = 3 * static_cast<Eigen::Index>(i);
+      J.block<2, 1>(row, column) =
+          was.tangentBasis().transpose() * (is.bearing_world - was.bearing_world) / kStep;
+      J(row + 2, column) = (is.inverse_depth - was.inverse_depth) / kStep;
+    }
+  }
+  const Eigen::MatrixXd expected = J * other.covariance() * J.transpose();
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    for (std::size_t k = 0; k < ids.size(); ++k) {
+      const Eigen::Matrix3d own = joined.covariance().block<3, 3>(
+          joined.features()[i].bearingRow(), joined.features()[k].bearingRow());
+      const Eigen::Matrix3d numeric = expected.block<3, 3>(3 * i, 3 * k);
+      EXPECT_LT((own - numeric).norm(), 1e-5 * expected.norm()) << i << " " << k;
+    }
+}
+
 TEST(MapJoiner, ThePosesOfWhatComesAlongAreTakenOver) {
   const TwoMaps maps(2);
   Ekf filter = maps.map;
   const Eigen::Isometry3d camera_in_other = maps.other.camera().poseWorldCamera();
-  const JoinedPoints joined =
-      joinPoints(maps.other, maps.others, {1.0 / kOtherUnit, 0.05}, &filter);
+  const JoinedFeatures joined =
+      joinFeatures(maps.other, maps.others, {1.0 / kOtherUnit, 0.05}, &filter);
   EXPECT_TRUE(joined(camera_in_other).isApprox(maps.map.camera().poseWorldCamera(), 1e-9))
       << "the two cameras are one";
   EXPECT_EQ(filter.camera().position_world, maps.map.camera().position_world);

@@ -96,8 +96,8 @@ class Relocaliser {
   /// Time that the next step takes by a model [ms].
   static double stepMs(const std::vector<Landmark>& landmarks, const CameraLook& look);
 
-  /// Whether most landmarks that a camera at about `T_world_camera` should see are where they should
-  /// be: the camera is then there. Empty when it is not.
+  /// Whether most landmarks that a camera at about `T_world_camera` should see are where they
+  /// should be: the camera is then there. Empty when it is not.
   std::optional<Relocalisation> prove(const CameraModel& camera, const cv::Mat& image,
                                       const std::vector<Landmark>& landmarks,
                                       Eigen::Isometry3d T_world_camera,
