@@ -234,8 +234,11 @@ void Tracker::Implementation::goOnIn(const Place& place, const Relocalisation& f
 /// since: two looks that agree. Whether it goes on in another map.
 bool Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, double interval_s,
                                                TrackedFrame* frame) {
-  if (state_ != TrackingState::kTracking || poor_frames_ > 0 || lost_maps_.empty()) return false;
+  if (state_ != TrackingState::kTracking || poor_frames_ > 0) return false;
+  // It came back by itself.
   if (look_ && look_->purpose == OngoingLook::Purpose::kLost) endLook();
+  if (sighting_ && sighting_->place.kind != Place::Kind::kLostMap) sighting_.reset();
+  if (lost_maps_.empty()) return false;
   if (sighting_) return confirmOtherMap(image, frame);
   if (!look_ && last_stamp_s_ - last_look_stamp_s_ >= kLookPeriodS) {
     last_look_stamp_s_ = last_stamp_s_;

@@ -202,9 +202,15 @@ UpdateReport Tracker::Implementation::relocateByInliers(const Relocalisation& fo
   CameraState camera;
   camera.setPoseWorldCamera(found.T_world_camera);
   double depth = 0.0;
-  for (const FeatureMeasurement& inlier : found.inliers)
-    depth += (filter->find(inlier.id)->position() - camera.position_world).norm();
-  depth /= static_cast<double>(found.inliers.size());
+  int known = 0;  // the others have been retired since
+  for (const FeatureMeasurement& inlier : found.inliers) {
+    const FeatureState* feature = filter->find(inlier.id);
+    if (!feature) continue;
+    depth += (feature->position() - camera.position_world).norm();
+    ++known;
+  }
+  if (known == 0) return {};
+  depth /= known;
   Eigen::Matrix<double, 12, 1> sigma;
   sigma << Eigen::Vector3d::Constant(kRelocalisedSigmaPosition * depth),
       Eigen::Vector3d::Constant(kRelocalisedSigmaRotation),

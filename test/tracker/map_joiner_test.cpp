@@ -18,7 +18,7 @@ constexpr double kOtherUnit = 1.6;
 
 FilterOptions allBecomePoints() {
   FilterOptions options;
-  options.linearity_threshold = 100.0;
+  options.linearity_threshold = 10.0;
   return options;
 }
 
