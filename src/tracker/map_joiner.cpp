@@ -14,7 +14,7 @@ namespace active_matching_slam {
 namespace {
 
 /// Distance in the image within which two landmarks are taken to be at one depth, of an image 640
-/// wide [px]. Cost: farther, more of them lie on other surfaces, which shows in the scatter.
+/// wide [px]. Cost: farther, more of them lie on other surfaces, which shows in the spread.
 constexpr double kNeighbourPx = 80.0;
 /// Relative standard deviation of an inverse depth that is compared. Derivation: infinity is five
 /// sigma away.
@@ -117,14 +117,14 @@ std::optional<UnitRatio> unitRatio(const CameraModel& camera, const Ekf& map, co
   const double median = medianOf(ratios);
   for (const double ratio : ratios) deviations.push_back(std::abs(ratio - median));
   const double n = static_cast<double>(pairs.size());
-  const double scatter = kDeviationsOfMedian * medianOf(deviations);
+  const double spread = kDeviationsOfMedian * medianOf(deviations);
   Eigen::VectorXd of_map = Eigen::VectorXd::Zero(map.stateSize());
   Eigen::VectorXd of_other = Eigen::VectorXd::Zero(other.stateSize());
   for (const Pair& pair : pairs) {
     addLogDistance(map, *pair.mine, 1.0 / n, &of_map);
     addLogDistance(other, *pair.others, 1.0 / n, &of_other);
   }
-  const double variance = kMedianOverMean * kMedianOverMean * scatter * scatter / n +
+  const double variance = kMedianOverMean * kMedianOverMean * spread * spread / n +
                           of_map.dot(map.covariance() * of_map) +
                           of_other.dot(other.covariance() * of_other);
   if (!(variance >= 0.0) || !std::isfinite(median)) return std::nullopt;

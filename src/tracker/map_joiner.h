@@ -20,7 +20,7 @@ struct UnitRatio {
 
 /// Of two maps of the same place, of which both filters' cameras saw the same image: the ratio of
 /// the depths of what is in view next to each other, the median over landmarks. `sights`: of
-/// landmarks of `map` in this image. As uncertain as their scatter, and as the depths of each map
+/// landmarks of `map` in this image. As uncertain as their spread, and as the depths of each map
 /// are together. Empty where fewer than five landmarks of the one have one of the other nearby.
 std::optional<UnitRatio> unitRatio(const CameraModel& camera, const Ekf& map, const Ekf& other,
                                    const std::vector<FeatureMeasurement>& sights);
