@@ -45,7 +45,7 @@ std::vector<std::string> calibrationDoubts(const CameraCalibration& calibration)
 DistortionModel distortionModelFromName(const std::string& name);
 std::string distortionModelName(DistortionModel model);
 
-/// Reads the yaml file of a camera: of camera_calibration, OpenCV, Kalibr (its cam0), EuRoC, VINS or
+/// Reads the yaml file of a camera: of camera_calibration, OpenCV, Kalibr (cam0), EuRoC, VINS or
 /// ORB-SLAM 2 or 3, or a camera_info message. `rectified`: of the rectified image, by its
 /// projection_matrix or P. Throws std::runtime_error that names the file and the field at fault.
 CameraCalibration readCalibrationYaml(const std::string& path, bool rectified = false);
