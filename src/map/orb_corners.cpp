@@ -1,7 +1,6 @@
 #include "orb_corners.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <opencv2/features2d.hpp>
@@ -12,7 +11,12 @@ namespace {
 
 constexpr int kPatchSize = 31, kRadius = kPatchSize / 2;
 constexpr int kCornersOfScale = 1000;
-constexpr double kScales[] = {1.6, 1.26, 1.0, 0.8, 0.63, 0.5};  // the longest work first
+constexpr double kScales[] = {1.6, 1.26, 1.0, 0.8, 0.63, 0.5};
+/// Cost: pixels of a band, by the time of a step; with smaller ones more rows are read twice.
+constexpr int kBandPixels = 200000;
+/// Rows that a band reads on either side. Derivation: a rotated patch reaches half its diagonal,
+/// and smoothing 3 pixels more.
+constexpr int kBandMargin = 26;
 
 /// Direction from a point to the centroid of intensity of the disc around it, as ORB defines it.
 /// Points of the disc outside the image are left out together with their opposites.
@@ -43,49 +47,70 @@ cv::KeyPoint keypointAt(const cv::Mat& image, const cv::Point& point) {
   return {cv::Point2f(point), static_cast<float>(kPatchSize), orientation(image, point), 0.0f, 0};
 }
 
-DescribedPoints describeCornersAtScale(const cv::Mat& image, double scale) {
-  DescribedPoints result;
-  cv::Mat scaled;
-  cv::resize(image, scaled, cv::Size(), scale, scale,
-             scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
-  if (scaled.cols < 2 * kPatchSize || scaled.rows < 2 * kPatchSize) return result;
-  std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(scaled, corners, kCornersOfScale, 0.005, 4.0);
-  std::vector<cv::KeyPoint> keypoints;
-  for (const cv::Point2f& corner : corners) {
-    const cv::Point point(cvRound(corner.x), cvRound(corner.y));
-    if (point.x >= kRadius && point.y >= kRadius && point.x < scaled.cols - kRadius &&
-        point.y < scaled.rows - kRadius)
-      keypoints.push_back(keypointAt(scaled, point));
-  }
-  if (!keypoints.empty()) createDescriber()->compute(scaled, keypoints, result.descriptors);
-  const double factor_u = static_cast<double>(image.cols) / scaled.cols;
-  const double factor_v = static_cast<double>(image.rows) / scaled.rows;
-  for (const cv::KeyPoint& keypoint : keypoints)
-    result.pixels.emplace_back((keypoint.pt.x + 0.5) * factor_u - 0.5,
-                               (keypoint.pt.y + 0.5) * factor_v - 0.5);
-  return result;
-}
-
 }  // namespace
 
-DescribedPoints describeCorners(const cv::Mat& image, const ImageMask& mask) {
-  std::array<DescribedPoints, std::size(kScales)> of_scale;
-  const auto describe = [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i)
-      of_scale[i] = describeCornersAtScale(image, kScales[i]);
-  };
-  const auto count = static_cast<int>(of_scale.size());
-  cv::parallel_for_(cv::Range(0, count), describe, count);
-  DescribedPoints result;
-  for (const DescribedPoints& points : of_scale) {
-    for (std::size_t i = 0; i < points.pixels.size(); ++i) {
-      if (!mask.isSearched(points.pixels[i])) continue;
-      result.pixels.push_back(points.pixels[i]);
-      result.descriptors.push_back(points.descriptors.row(static_cast<int>(i)));
-    }
+CornerScan::CornerScan(const cv::Mat& image, const ImageMask& mask) : image_(image), mask_(mask) {
+  beginScale();
+}
+
+bool CornerScan::isDone() const { return scale_ == std::size(kScales); }
+
+/// Scales at which the image is too small have no bands.
+void CornerScan::beginScale() {
+  for (band_ = bands_ = 0; scale_ < std::size(kScales); ++scale_) {
+    const double scale = kScales[scale_];
+    cv::resize(image_, scaled_, cv::Size(), scale, scale,
+               scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
+    if (scaled_.cols < 2 * kPatchSize || scaled_.rows < 2 * kPatchSize) continue;
+    bands_ = static_cast<int>(scaled_.total()) / kBandPixels + 1;
+    return;
   }
-  return result;
+}
+
+cv::Range CornerScan::band() const {
+  return {band_ * scaled_.rows / bands_, (band_ + 1) * scaled_.rows / bands_};
+}
+
+double CornerScan::nextPixels() const {
+  return isDone() ? 0.0 : static_cast<double>(band().size()) * scaled_.cols;
+}
+
+void CornerScan::step() {
+  if (isDone()) return;
+  const cv::Range rows = band();
+  const auto widened = [&](int margin) {
+    return cv::Range(std::max(rows.start - margin, 0), std::min(rows.end + margin, scaled_.rows));
+  };
+  std::vector<cv::Point2f> corners;
+  constexpr int kGradientMargin = 3;  // Derivation: of a gradient, summed over 3 x 3, and a maximum
+  const cv::Range searched = widened(kGradientMargin), read = widened(kBandMargin);
+  cv::goodFeaturesToTrack(scaled_.rowRange(searched), corners, kCornersOfScale / bands_, 0.005,
+                          4.0);
+  std::vector<cv::KeyPoint> keypoints;
+  for (const cv::Point2f& corner : corners) {
+    const cv::Point point(cvRound(corner.x), cvRound(corner.y) + searched.start);
+    if (point.y < rows.start || point.y >= rows.end || point.x < kRadius || point.y < kRadius ||
+        point.x >= scaled_.cols - kRadius || point.y >= scaled_.rows - kRadius)
+      continue;
+    keypoints.push_back(keypointAt(scaled_, point));
+    keypoints.back().pt.y -= static_cast<float>(read.start);
+  }
+  cv::Mat descriptors;
+  if (!keypoints.empty())
+    createDescriber()->compute(scaled_.rowRange(read), keypoints, descriptors);
+  const double factor_u = static_cast<double>(image_.cols) / scaled_.cols;
+  const double factor_v = static_cast<double>(image_.rows) / scaled_.rows;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const cv::Point2f& point = keypoints[i].pt;
+    const Eigen::Vector2d pixel((point.x + 0.5) * factor_u - 0.5,
+                                (point.y + read.start + 0.5) * factor_v - 0.5);
+    if (!mask_.isSearched(pixel)) continue;
+    points_.pixels.push_back(pixel);
+    points_.descriptors.push_back(descriptors.row(static_cast<int>(i)));
+  }
+  if (++band_ < bands_) return;
+  ++scale_;
+  beginScale();
 }
 
 cv::Mat describePoint(const cv::Mat& image, const Eigen::Vector2d& point) {

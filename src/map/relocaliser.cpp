@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
+#include <random>
+#include <utility>
 
 #include "active_matching_slam/image/image_feature_search.h"
 #include "active_matching_slam/image/warp.h"
@@ -26,6 +28,12 @@ constexpr double kSameCornerPx = 6.0;
 constexpr int kMinimumSightings = 6;
 /// Derivation: (1 - 0.2^3)^1000 < 0.001: three right ones are drawn where 2 in 10 are right.
 constexpr int kRansacIterations = 1000;
+/// Of these, in one step. Cost: of the step.
+constexpr int kDrawsOfStep = 250;
+/// Probability that three right ones are drawn. Derivation: that of kRansacIterations.
+constexpr double kDrawnProbability = 0.999;
+/// Landmarks whose descriptors are made and matched in one step. Cost: of the step.
+constexpr std::size_t kLandmarksOfStep = 50;
 /// Residual of a RANSAC inlier [px]. Cost: coarse, as ORB corners of the smallest scale are.
 constexpr float kRansacPx = 5.0f;
 /// Radius searched about where the first, coarse pose predicts a feature [px]. Cost: of the search;
@@ -38,7 +46,40 @@ constexpr double kInlierPx = 3.0;
 /// square.
 constexpr double kMaximumSlope = 5.0;
 
+// Modelled time of the parts of a look [ms], on one core of about 3 GHz. Cost: medians.
+/// Of finding and describing the corners of a million pixels; of a landmark's descriptor; of a pair
+/// of descriptors; of a draw of three, and for each sighting that votes; of a landmark's proof.
+constexpr double kCornersMs = 20.0, kDescribeMs = 0.012, kPairMs = 1.1e-5, kDrawMs = 0.006,
+                 kVoteOfDrawMs = 1.6e-4, kProofMs = 0.04;
+
+/// Of the sightings, by which draw of a step is to differ from those of the steps before.
+template <class T>
+void shuffle(std::uint32_t seed, std::vector<T>* all) {
+  std::mt19937 random(seed);
+  for (std::size_t i = all->size(); i > 1; --i) std::swap((*all)[i - 1], (*all)[random() % i]);
+}
+
+const Landmark* findLandmark(const std::vector<Landmark>& landmarks, FeatureId id) {
+  const auto it = std::lower_bound(
+      landmarks.begin(), landmarks.end(), id,
+      [](const Landmark& landmark, FeatureId i) { return landmark.feature->id < i; });
+  return it != landmarks.end() && it->feature->id == id ? &*it : nullptr;
+}
+
 }  // namespace
+
+CameraLook::CameraLook(const cv::Mat& image, const ImageMask& mask)
+    : image_(image), mask_(mask), corners_(std::make_shared<CornerScan>(image, mask)) {}
+
+void CameraLook::beginPlace() {
+  stage_ = Stage::kCorners;
+  landmark_ = 0;
+  sightings_.clear();
+  draws_ = 0;
+  inliers_ = 0;
+  best_.reset();
+  T_world_camera_.reset();
+}
 
 Relocaliser::Relocaliser(const RelocaliserOptions& options, const MapOptions& map,
                          const ImageOptions& image)
@@ -60,9 +101,53 @@ std::optional<Relocalisation> Relocaliser::find(const CameraModel& camera, const
   if (image.type() != CV_8UC1 || image.cols != camera.width() || image.rows != camera.height())
     return std::nullopt;
   if (static_cast<int>(landmarks.size()) < options_.minimum_inliers) return std::nullopt;
-  const auto T_world_camera = solvePose(camera, matchDescriptors(image, landmarks, mask));
-  if (!T_world_camera) return std::nullopt;
-  return prove(camera, image, landmarks, *T_world_camera, mask);
+  CameraLook look(image, mask);
+  while (!look.isOver()) step(camera, landmarks, &look);
+  if (!look.pose()) return std::nullopt;
+  return prove(camera, image, landmarks, *look.pose(), mask);
+}
+
+double Relocaliser::stepMs(const std::vector<Landmark>& landmarks, const CameraLook& look) {
+  switch (look.stage_) {
+    case CameraLook::Stage::kCorners:
+      return 1e-6 * kCornersMs * look.corners_->nextPixels();
+    case CameraLook::Stage::kMatch:
+      return static_cast<double>(std::min(
+                 landmarks.size() - std::min(look.landmark_, landmarks.size()), kLandmarksOfStep)) *
+             (kDescribeMs + kPairMs * static_cast<double>(look.corners_->points().pixels.size()));
+    case CameraLook::Stage::kConsensus:
+      return kDrawsOfStep * (kDrawMs + kVoteOfDrawMs * static_cast<double>(look.sightings_.size()));
+    default:
+      return 0.0;
+  }
+}
+
+double Relocaliser::proofMs(const std::vector<Landmark>& landmarks) {
+  return kProofMs * static_cast<double>(landmarks.size());
+}
+
+void Relocaliser::step(const CameraModel& camera, const std::vector<Landmark>& landmarks,
+                       CameraLook* look) const {
+  using Stage = CameraLook::Stage;
+  if (static_cast<int>(landmarks.size()) < options_.minimum_inliers) look->stage_ = Stage::kOver;
+  switch (look->stage_) {
+    case Stage::kCorners:
+      if (!look->corners_->isDone()) look->corners_->step();
+      if (look->corners_->isDone()) look->stage_ = Stage::kMatch;
+      break;
+    case Stage::kMatch:
+      matchDescriptors(landmarks, look);
+      if (look->landmark_ >= landmarks.size())
+        look->stage_ = look->sightings_.size() < static_cast<std::size_t>(kMinimumSightings)
+                           ? Stage::kOver
+                           : Stage::kConsensus;
+      break;
+    case Stage::kConsensus:
+      drawConsensus(camera, landmarks, look);
+      break;
+    default:
+      break;
+  }
 }
 
 std::optional<Relocalisation> Relocaliser::findByMatches(
@@ -71,14 +156,12 @@ std::optional<Relocalisation> Relocaliser::findByMatches(
   const std::vector<Landmark> landmarks = usableLandmarks(filter, map);
   std::vector<Sighting> sightings;
   for (const FeatureMeasurement& match : matches) {
-    const auto landmark = std::find_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) {
-      return l.feature->id == match.id;
-    });
-    if (landmark != landmarks.end()) sightings.push_back({&*landmark, match.pixel});
+    if (const Landmark* landmark = findLandmark(landmarks, match.id))
+      sightings.push_back({landmark, match.pixel});
   }
-  const auto T_world_camera = solvePose(camera, sightings);
-  if (!T_world_camera) return std::nullopt;
-  return prove(camera, image, landmarks, *T_world_camera, mask);
+  const auto consensus = solvePose(camera, sightings, kRansacIterations);
+  if (!consensus) return std::nullopt;
+  return prove(camera, image, landmarks, consensus->T_world_camera, mask);
 }
 
 std::optional<Relocalisation> Relocaliser::prove(const CameraModel& camera, const cv::Mat& image,
@@ -128,20 +211,19 @@ std::vector<Landmark> Relocaliser::usableLandmarks(const Ekf& filter, const Feat
   return landmarks;
 }
 
-std::vector<Relocaliser::Sighting> Relocaliser::matchDescriptors(
-    const cv::Mat& image, const std::vector<Landmark>& landmarks, const ImageMask& mask) const {
+/// Of the next landmarks.
+void Relocaliser::matchDescriptors(const std::vector<Landmark>& landmarks, CameraLook* look) {
   cv::Mat descriptors;
-  std::vector<const Landmark*> described;
-  for (const Landmark& landmark : landmarks) {
-    const SourcePatch& patch = landmark.feature->patch;
-    const cv::Mat descriptor = describePoint(patch.image, patch.center);
+  std::vector<FeatureId> described;
+  for (std::size_t k = 0; k < kLandmarksOfStep && look->landmark_ < landmarks.size(); ++k) {
+    const MapFeature& feature = *landmarks[look->landmark_++].feature;
+    const cv::Mat descriptor = describePoint(feature.patch.image, feature.patch.center);
     if (descriptor.empty()) continue;
     descriptors.push_back(descriptor);
-    described.push_back(&landmark);
+    described.push_back(feature.id);
   }
-  const DescribedPoints points = describeCorners(image, mask);
-  std::vector<Sighting> sightings;
-  if (described.empty() || points.pixels.empty()) return sightings;
+  const DescribedPoints& points = look->corners_->points();
+  if (described.empty() || points.pixels.empty()) return;
   cv::Mat distances;  // a row for each landmark
   cv::batchDistance(descriptors, points.descriptors, distances, CV_32S, cv::noArray(),
                     cv::NORM_HAMMING);
@@ -154,13 +236,38 @@ std::vector<Relocaliser::Sighting> Relocaliser::matchDescriptors(
       if (row[i] < second && (points.pixels[i] - points.pixels[best]).norm() > kSameCornerPx)
         second = row[i];
     if (row[best] < kMaximumDistanceRatio * second)
-      sightings.push_back({described[k], points.pixels[best]});
+      look->sightings_.push_back({described[k], points.pixels[best]});
   }
-  return sightings;
 }
 
-std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
-    const CameraModel& camera, const std::vector<Sighting>& sightings) const {
+/// Landmarks that are known no more drop out. Draws until three right ones have been drawn as
+/// surely as by kRansacIterations where few are right. Every step draws from another order, as each
+/// begins with the same random numbers.
+void Relocaliser::drawConsensus(const CameraModel& camera, const std::vector<Landmark>& landmarks,
+                                CameraLook* look) const {
+  std::vector<Sighting> sightings;
+  for (const CameraLook::Sighting& sighting : look->sightings_)
+    if (const Landmark* landmark = findLandmark(landmarks, sighting.id))
+      sightings.push_back({landmark, sighting.pixel});
+  if (look->draws_ > 0) shuffle(static_cast<std::uint32_t>(look->draws_), &sightings);
+  const auto consensus = solvePose(camera, sightings, kDrawsOfStep);
+  look->draws_ += kDrawsOfStep;
+  if (consensus && consensus->inliers > look->inliers_) {
+    look->inliers_ = consensus->inliers;
+    look->best_ = consensus->T_world_camera;
+  }
+  const double right =
+      static_cast<double>(look->inliers_) / std::max<double>(1.0, double(sightings.size()));
+  const double needed =
+      right < 1.0 ? std::log(1.0 - kDrawnProbability) / std::log1p(-right * right * right) : 0.0;
+  if (look->draws_ < kRansacIterations && !(look->draws_ >= needed)) return;
+  look->T_world_camera_ = look->best_;
+  look->stage_ = CameraLook::Stage::kOver;
+}
+
+std::optional<Relocaliser::Consensus> Relocaliser::solvePose(const CameraModel& camera,
+                                                             const std::vector<Sighting>& sightings,
+                                                             int draws) const {
   // Ideal pixels: those of a lens without distortion and square pixels.
   const double focal = 0.5 * (camera.calibration().fx + camera.calibration().fy);
   std::vector<cv::Point3d> points;
@@ -178,8 +285,8 @@ std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
   cv::Vec3d rotation, translation;
   std::vector<int> inliers;
   try {  // its random numbers start from a fixed seed at every call
-    if (!cv::solvePnPRansac(points, ideal, K, cv::noArray(), rotation, translation, false,
-                            kRansacIterations, kRansacPx, 0.999, inliers, cv::SOLVEPNP_P3P))
+    if (!cv::solvePnPRansac(points, ideal, K, cv::noArray(), rotation, translation, false, draws,
+                            kRansacPx, kDrawnProbability, inliers, cv::SOLVEPNP_P3P))
       return std::nullopt;
   } catch (const cv::Exception&) {  // degenerate points
     return std::nullopt;
@@ -190,7 +297,7 @@ std::optional<Eigen::Isometry3d> Relocaliser::solvePose(
       rotationFromVector(Eigen::Vector3d(rotation[0], rotation[1], rotation[2])).toRotationMatrix();
   T_camera_world.translation() << translation[0], translation[1], translation[2];
   if (!T_camera_world.matrix().allFinite()) return std::nullopt;
-  return T_camera_world.inverse();
+  return Consensus{T_camera_world.inverse(), inliers.size()};
 }
 
 int Relocaliser::searchVisible(const CameraModel& camera, const cv::Mat& image,

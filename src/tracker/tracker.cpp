@@ -73,6 +73,7 @@ void Tracker::Implementation::clearMap() {
   submaps_.clear();
   loop_witness_.clear();
   loop_undo_.reset();
+  endLook();
   map_monitor_.reset();
   initialiser_.end();
   structure_.clear();
@@ -101,6 +102,7 @@ void Tracker::Implementation::setOptions(const TrackerOptions& options) {
   noise_.setOptions(options.filter);
   motion_noise_.setOptions(options.filter);
   relocaliser_ = Relocaliser(options.relocaliser, options.map, options.image);
+  endLook();
   submaps_.setOptions(options.submap_filter);
   options_ = options;
 }
@@ -127,6 +129,7 @@ void Tracker::Implementation::rescaleBesideFilter(double factor) {
   loop_undo_.reset();
   initialiser_.rescale(factor);
   T_world_reference_.translation() *= factor;
+  endLook();
   scale_finder_.reset();
 }
 
@@ -181,7 +184,7 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   scaleByGround(frame);
   if (watchLoop(frame)) return current;
   retakePatches(current);
-  lookForLoop(image, frame);
+  lookForLoop(image, interval_s, frame);
   maintainMap(image, frame);
   followTarget(image, frame);
   frame->timings_ms.map = stage.lap();
@@ -208,7 +211,7 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
   frame->mask = mask_.used();
   const cv::Mat used = mask_.applyTo(image);
   frame->repeated_image = !previous_image_.empty() && isRepeatedImage(used, previous_image_);
-  last_stamp_s_ = stamp_s;
+  const double before_s = std::exchange(last_stamp_s_, stamp_s);
   motion_.reset();
   motion_fault_.clear();
 
@@ -221,17 +224,19 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     state_stamp_s_ = stamp_s;
     predict(interval_s);
     if (!is_pose_given_ || !findNearGivenPose(used, interval_s, frame.get()))
-      relocaliseWhileLost(used, frame.get());
+      relocaliseWhileLost(used, interval_s, frame.get());
   } else if (!frame->repeated_image) {
     const double interval_s = stamp_s - state_stamp_s_;
     state_stamp_s_ = stamp_s;
     predict(interval_s);
     frame->timings_ms.predict = stage.lap();
     // Over a long gap, or when too little has matched for a while, the prediction is next to
-    // worthless: the whole image is searched for the map first.
-    const bool is_due = (interval_s > options_.max_frame_interval_s && !isTranslationKnown()) ||
-                        (poor_frames_ > 0 && poor_frames_ % kRelocalisationPeriodFrames == 0);
-    if (!is_due || !relocalise(used, frame.get()))
+    // worthless: the whole image is searched for the map first. A gap has left time for all of it.
+    const bool is_gap = interval_s > options_.max_frame_interval_s && !isTranslationKnown();
+    if (is_gap) endLook();
+    const bool is_due = is_gap || poor_frames_ >= kRelocalisationPeriodFrames;
+    if (!is_due || !lookWhileLost(used, is_gap ? LookBudget::kWhole : LookBudget::kHalf, interval_s,
+                                  frame.get()))
       current.emplace(follow(used, interval_s, frame.get()));
   }
   previous_image_ = mask_.isWhole() ? image.clone() : used;  // the caller may reuse its memory
@@ -239,7 +244,8 @@ std::shared_ptr<const TrackedFrame> Tracker::Implementation::track(const cv::Mat
     reference_image_ = previous_image_;
     reference_index_ = frame->index;
   }
-  if (lookForOtherMaps(used, frame.get())) current.reset();
+  forgetOldMaps();
+  if (lookForOtherMaps(used, stamp_s - before_s, frame.get())) current.reset();
   frame->state = state_;
   // Where not even the second image knew the first, the third one's origin is a claim of nothing.
   if (current && state_ == TrackingState::kTracking && unrelated_images_ > 1) {

@@ -22,12 +22,13 @@
 #include "active_matching_slam/tracker/tracking_quality.h"
 #include "frame_noise.h"
 #include "loop_finder.h"
+#include "map_joiner.h"
 #include "submap_keeper.h"
 
 namespace active_matching_slam {
 
-/// Every how many frames relocalisation is attempted. Cost: an attempt takes as long as some
-/// frames.
+/// Frames with too few matches after which the camera is looked for. Cost: until then it may come
+/// back by itself, and a look takes half of a frame's time.
 constexpr int kRelocalisationPeriodFrames = 4;
 /// A stamp that runs back by less is a late image; by more, the time is another [s]. Cost: with a
 /// clock that was set back no image is taken for so long.
@@ -35,7 +36,8 @@ constexpr double kClockStep_s = 1.0;
 
 /// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
 /// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_submaps.cpp,
-/// tracker_lost.cpp and tracked_frame.cpp. What is known of the frame in hand is passed from one to
+/// tracker_lost.cpp,
+/// tracker_look.cpp and tracked_frame.cpp. What is known of the frame in hand is passed from one to
 /// the next (FrameState); members hold what lasts.
 class Tracker::Implementation {
  public:
@@ -103,11 +105,10 @@ class Tracker::Implementation {
   void updateTrackingState(const FrameState& current);
   void lose(const std::string& reason);
   void lookForCamera(const std::string& reason);
-  void relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame);
-  bool relocalise(const cv::Mat& image, TrackedFrame* frame);
+  void relocaliseWhileLost(const cv::Mat& image, double interval_s, TrackedFrame* frame);
   void placeCamera(const Relocalisation& found, TrackedFrame* frame);
   bool beginNewMap(const cv::Mat& image, TrackedFrame* frame);
-  bool lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame);
+  void forgetOldMaps();
   void abandonMap(const std::string& reason);
   void clearMap();
   bool findNearGivenPose(const cv::Mat& image, double interval_s, TrackedFrame* frame);
@@ -123,11 +124,10 @@ class Tracker::Implementation {
   int mostFeatures() const;
   void keepSubmaps(const TrackedFrame& frame);
   std::vector<Eigen::Vector2d> frozenPixels() const;
-  void lookForLoop(const cv::Mat& image, TrackedFrame* frame);
+  void lookForLoop(const cv::Mat& image, double interval_s, TrackedFrame* frame);
   void closeLoop(int submap, const Relocalisation& found, const CameraOffset& offset,
                  TrackedFrame* frame);
   bool watchLoop(TrackedFrame* frame);
-  bool relocaliseInSubmaps(const cv::Mat& image, TrackedFrame* frame);
   void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);
@@ -177,6 +177,52 @@ class Tracker::Implementation {
   };
   void takeBack(LoopUndo undo);
 
+  /// Where the camera is looked for.
+  struct Place {
+    enum class Kind { kMap, kSubmap, kLostMap };
+    Kind kind;
+    int number;  ///< of the submap or of the lost map
+  };
+  /// A look for the camera that goes on over some frames.
+  struct OngoingLook {
+    enum class Purpose { kLost, kLoop, kOtherMap };
+    Purpose purpose;
+    CameraLook look;
+    std::vector<Place> places;  ///< not empty; the last is looked at first
+    double stamp_s;
+    Eigen::Isometry3d T_world_camera;  ///< where the camera was taken to be, in the map in hand
+  };
+  /// A camera that was found in an image of before.
+  struct Sighting {
+    Place place;
+    Relocalisation found;
+    cv::Mat image;
+    double stamp_s;
+    Eigen::Isometry3d T_world_camera;  ///< as in OngoingLook
+    int images = 0;                    ///< in which it was looked for near there
+  };
+  enum class LookBudget { kWhole, kHalf, kQuarter };
+
+  double lookMilliseconds(LookBudget share, double interval_s) const;
+  void beginLook(OngoingLook::Purpose purpose, const cv::Mat& image, std::vector<Place> places);
+  void endLook();
+  void endPlace();
+  std::vector<Landmark> landmarksOf(const Place& place) const;
+  std::optional<Eigen::Isometry3d> continueLook(double milliseconds, double* spent_ms);
+  std::vector<Place> placesWhileLost();
+  bool lookWhileLost(const cv::Mat& image, LookBudget share, double interval_s,
+                     TrackedFrame* frame);
+  std::optional<Relocalisation> findNear(const Sighting& sighting, const cv::Mat& image,
+                                         double interval_s);
+  void goOnIn(const Place& place, const Relocalisation& found, TrackedFrame* frame);
+  void enterPlace(const Place& place);
+  UpdateReport relocateByInliers(const Relocalisation& found, Ekf* filter) const;
+  bool lookForOtherMaps(const cv::Mat& image, double interval_s, TrackedFrame* frame);
+  bool confirmOtherMap(const cv::Mat& image, TrackedFrame* frame);
+  bool joinMaps(const Place& place, const Relocalisation& found, TrackedFrame* frame);
+  void takeFeatures(const Ekf& other, const FeatureMap& other_map, const UnitRatio& unit);
+  int lostMapIndex(int number) const;
+
   LostMap storeMap();
   void takeMap(LostMap stored);
 
@@ -211,8 +257,9 @@ class Tracker::Implementation {
   MapStructure::Snapshot structure_snapshot_;
 
   std::vector<LostMap> lost_maps_;  ///< the one that was lost last at the end
-  std::size_t next_lost_map_ = 0;   ///< to be looked for
-  double last_look_stamp_s_ = 0.0;  ///< when one was looked for
+  double last_look_stamp_s_ = 0.0;  ///< when they were looked for
+  std::optional<OngoingLook> look_;
+  std::optional<Sighting> sighting_;  ///< to be confirmed in the next image
   int map_number_ = 0, maps_begun_ = 1;
   bool awaits_loaded_map_ =
       false;  ///< the camera has not been found yet in the map that was loaded

@@ -15,9 +15,6 @@ namespace {
 /// Derivation: vague, ten times and more what inliers of some pixels leave open (about 1 % of the
 /// depth, 0.01 rad), so that the update by the inliers determines the pose.
 constexpr double kRelocalisedSigmaPosition = 0.2, kRelocalisedSigmaRotation = 0.1;
-/// Time between two looks for the camera in maps in which it was lost, while it is tracked in
-/// another [s]. Cost: a look takes as long as a frame or two.
-constexpr double kLookPeriodS = 0.5;
 constexpr std::size_t kMostLostMaps = 4;  ///< Cost: memory, and time until each is looked in again
 
 }  // namespace
@@ -99,7 +96,8 @@ void Tracker::Implementation::lookForCamera(const std::string& reason) {
 }
 
 /// What becomes of an image while the camera is lost.
-void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedFrame* frame) {
+void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, double interval_s,
+                                                  TrackedFrame* frame) {
   const double lost_s = last_stamp_s_ - lost_stamp_s_;
   // Lost soon after the start: nothing is known but directions.
   if (options_.mapping && !relocaliser_.canFind(filter_, map_) &&
@@ -114,12 +112,14 @@ void Tracker::Implementation::relocaliseWhileLost(const cv::Mat& image, TrackedF
     abandonMap(reason.str());
     return;
   }
-  if (frame->index % kRelocalisationPeriodFrames == 0 &&
-      (relocalise(image, frame) || (options_.mapping && relocaliseInSubmaps(image, frame))))
+  const bool is_new_map_due = options_.mapping && options_.new_map_when_lost_after_s > 0.0 &&
+                              lost_s >= options_.new_map_when_lost_after_s && !awaits_loaded_map_ &&
+                              !is_pose_given_;
+  const bool is_time_shared = is_new_map_due || is_pose_given_;
+  if (lookWhileLost(image, is_time_shared ? LookBudget::kHalf : LookBudget::kWhole, interval_s,
+                    frame))
     return;
-  if (options_.mapping && options_.new_map_when_lost_after_s > 0.0 &&
-      lost_s >= options_.new_map_when_lost_after_s && !awaits_loaded_map_ && !is_pose_given_)
-    beginNewMap(image, frame);
+  if (is_new_map_due) beginNewMap(image, frame);
 }
 
 Tracker::Implementation::LostMap Tracker::Implementation::storeMap() {
@@ -144,6 +144,7 @@ void Tracker::Implementation::takeMap(LostMap stored) {
   structure_.clear();
   structure_snapshot_ = {};
   initialiser_.end();
+  endLook();
 }
 
 /// Keeps the map that was lost, and begins another one where the image has enough to begin from.
@@ -171,40 +172,15 @@ bool Tracker::Implementation::beginNewMap(const cv::Mat& image, TrackedFrame* fr
   return true;
 }
 
-/// While the camera is tracked in one map, looks for it in those in which it was lost. Found, it
-/// goes on in that one; the other is kept in its place. Whether it is.
-bool Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, TrackedFrame* frame) {
-  if (options_.reset_when_lost_after_s > 0.0) {
-    lost_maps_.erase(std::remove_if(lost_maps_.begin(), lost_maps_.end(),
-                                    [this](const LostMap& lost) {
-                                      return last_stamp_s_ - lost.lost_stamp_s >=
-                                             options_.reset_when_lost_after_s;
-                                    }),
-                     lost_maps_.end());
-  }
-  if (lost_maps_.empty() || last_stamp_s_ - last_look_stamp_s_ < kLookPeriodS) return false;
-  last_look_stamp_s_ = last_stamp_s_;
-  const std::size_t k = next_lost_map_++ % lost_maps_.size();
-  const auto found =
-      relocaliser_.find(camera_, image, lost_maps_[k].filter, lost_maps_[k].map, mask_);
-  if (!found) return false;
-  LostMap left = storeMap();
-  left.lost_stamp_s = last_stamp_s_;
-  std::swap(left, lost_maps_[k]);
-  takeMap(std::move(left));
-  placeCamera(*found, frame);
-  if (!relocaliser_.canFind(lost_maps_[k].filter, lost_maps_[k].map))
-    lost_maps_.erase(lost_maps_.begin() + static_cast<std::ptrdiff_t>(k));
-  frame->reason = "found again in map " + std::to_string(map_number_);
-  return true;
-}
-
-/// Searches the whole image for the whole map. False when the camera is not found; the state is
-/// then as before.
-bool Tracker::Implementation::relocalise(const cv::Mat& image, TrackedFrame* frame) {
-  const auto found = relocaliser_.find(camera_, image, filter_, map_, mask_);
-  if (found) placeCamera(*found, frame);
-  return found.has_value();
+/// Gives up maps that were lost too long ago.
+void Tracker::Implementation::forgetOldMaps() {
+  if (!(options_.reset_when_lost_after_s > 0.0)) return;
+  lost_maps_.erase(std::remove_if(lost_maps_.begin(), lost_maps_.end(),
+                                  [this](const LostMap& lost) {
+                                    return last_stamp_s_ - lost.lost_stamp_s >=
+                                           options_.reset_when_lost_after_s;
+                                  }),
+                   lost_maps_.end());
 }
 
 /// Searches the gates of a camera that is somewhere near where it was said to be. The matches must
@@ -220,21 +196,33 @@ bool Tracker::Implementation::findNearGivenPose(const cv::Mat& image, double int
   return found.has_value();
 }
 
-/// Puts the camera where it was found in the map.
-void Tracker::Implementation::placeCamera(const Relocalisation& found, TrackedFrame* frame) {
+/// Puts a filter's camera where it was found in its map.
+UpdateReport Tracker::Implementation::relocateByInliers(const Relocalisation& found,
+                                                        Ekf* filter) const {
   CameraState camera;
   camera.setPoseWorldCamera(found.T_world_camera);
   double depth = 0.0;
-  for (const FeatureMeasurement& inlier : found.inliers)
-    depth += (filter_.find(inlier.id)->position() - camera.position_world).norm();
-  depth /= static_cast<double>(found.inliers.size());
+  int known = 0;  // the others have been retired since
+  for (const FeatureMeasurement& inlier : found.inliers) {
+    const FeatureState* feature = filter->find(inlier.id);
+    if (!feature) continue;
+    depth += (feature->position() - camera.position_world).norm();
+    ++known;
+  }
+  if (known == 0) return {};
+  depth /= known;
   Eigen::Matrix<double, 12, 1> sigma;
   sigma << Eigen::Vector3d::Constant(kRelocalisedSigmaPosition * depth),
       Eigen::Vector3d::Constant(kRelocalisedSigmaRotation),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_velocity_mps),
       Eigen::Vector3d::Constant(options_.filter.initial_sigma_angular_velocity_rps);
-  filter_.relocateCamera(camera, sigma.array().square().matrix().asDiagonal());
-  const UpdateReport report = filter_.update(camera_, found.inliers, {}, corrected());
+  filter->relocateCamera(camera, sigma.array().square().matrix().asDiagonal());
+  return filter->update(camera_, found.inliers, {}, corrected());
+}
+
+/// Puts the camera where it was found in the map.
+void Tracker::Implementation::placeCamera(const Relocalisation& found, TrackedFrame* frame) {
+  const UpdateReport report = relocateByInliers(found, &filter_);
   frame->nis = report.nis;
   frame->nis_degrees = 2 * report.used;
   state_ = TrackingState::kTracking;
@@ -242,6 +230,7 @@ void Tracker::Implementation::placeCamera(const Relocalisation& found, TrackedFr
   poor_frames_ = 0;
   is_pose_given_ = false;
   awaits_loaded_map_ = false;
+  endLook();
   motion_noise_.reset();
   initialiser_.end();
   ++jumps_;
@@ -256,6 +245,7 @@ void Tracker::Implementation::setPose(const Eigen::Isometry3d& T_world_camera,
     throw std::invalid_argument("the pose's covariance is not positive definite");
   lookForCamera("a pose was given: looking for the camera near it");
   map_monitor_.interrupt();
+  endLook();
   is_pose_given_ = true;
   CameraState camera;
   camera.setPoseWorldCamera(T_world_camera);
@@ -313,6 +303,7 @@ void Tracker::Implementation::loadMap(const std::string& path) {
   structure_.restore(content.graph);
   structure_snapshot_ = {};
   lost_maps_.clear();
+  endLook();
   awaits_loaded_map_ = true;
   map_number_ = maps_begun_++;
   is_pose_given_ = false;

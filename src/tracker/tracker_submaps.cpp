@@ -17,9 +17,9 @@ constexpr int kReactivationPeriodFrames = 4;
 /// With room left for fewer features, some are laid aside. Cost: with less room, features are begun
 /// later in a view that changes fast; with more, some leave that are soon to be seen again.
 constexpr int kRoomLeft = 15;
-/// Submaps in which the camera is looked for in an image, while it is tracked and while it is lost.
-/// Cost: each takes as long as a frame or two.
-constexpr int kSubmapsPerLook = 1, kSubmapsPerLookWhileLost = 3;
+/// Submaps in which the camera is looked for in an image. Cost: each takes as long as a quarter of
+/// the corners, which all have in common.
+constexpr int kSubmapsPerLook = 3;
 /// Features matched in so many images before a loop are carried along with the camera to where its
 /// submap shows it: a start for the correction, no more. Cost: iterations.
 constexpr std::int64_t kCarriedImages = 40;
@@ -73,17 +73,32 @@ std::vector<Eigen::Vector2d> Tracker::Implementation::frozenPixels() const {
 }
 
 /// Looks for places that were seen before, where the map may have drifted so far that they are not
-/// where they are predicted.
-void Tracker::Implementation::lookForLoop(const cv::Mat& image, TrackedFrame* frame) {
+/// where they are predicted: a part of the look in each frame. A place is proven in the image of
+/// now, to which the camera has been tracked since the one that was searched.
+void Tracker::Implementation::lookForLoop(const cv::Mat& image, double interval_s,
+                                          TrackedFrame* frame) {
   if (!submaps_.isEnabled() || submaps_.tree().leaves().empty() || !initialiser_.isDone() ||
-      poor_frames_ > 0 || state_ != TrackingState::kTracking ||
-      frame->index % kReactivationPeriodFrames != kReactivationPeriodFrames / 2)
+      poor_frames_ > 0 || state_ != TrackingState::kTracking)
     return;
-  const auto positions = submaps_.positions(filter_);
-  for (const int submap :
-       submaps_.loopCandidates(positions, filter_, camera_, options_.map, kSubmapsPerLook)) {
-    const auto found =
-        relocaliser_.find(camera_, image, submaps_.landmarks(submap, positions), mask_);
+  if (!look_ && frame->index % kReactivationPeriodFrames == kReactivationPeriodFrames / 2) {
+    std::vector<Place> places;
+    for (const int submap : submaps_.loopCandidates(submaps_.positions(filter_), filter_, camera_,
+                                                    options_.map, kSubmapsPerLook))
+      places.insert(places.begin(), {Place::Kind::kSubmap, submap});
+    beginLook(OngoingLook::Purpose::kLoop, image, std::move(places));
+  }
+  const double milliseconds = lookMilliseconds(LookBudget::kQuarter, interval_s);
+  double spent_ms = 0.0;
+  while (look_ && look_->purpose == OngoingLook::Purpose::kLoop) {
+    const auto pose = continueLook(milliseconds, &spent_ms);
+    if (!pose) return;
+    const int submap = look_->places.back().number;
+    const Eigen::Isometry3d T_then_now =
+        look_->T_world_camera.inverse() * filter_.camera().poseWorldCamera();
+    const std::vector<Landmark> landmarks = landmarksOf(look_->places.back());
+    endPlace();
+    spent_ms += Relocaliser::proofMs(landmarks);
+    const auto found = relocaliser_.prove(camera_, image, landmarks, *pose * T_then_now, mask_);
     if (!found) continue;
     const Conditional points =
         submaps_.tree().givenActive(activePoints(filter_), *submaps_.tree().find(submap));
@@ -144,6 +159,7 @@ void Tracker::Implementation::closeLoop(int submap, const Relocalisation& found,
   T_world_reference_ = jump * T_world_reference_;
   loop_undo_ = std::move(undo);
   loop_witness_.clear();
+  endLook();
   ++loops_;
   ++map_epoch_;
   frame->map_jump = jump;
@@ -157,6 +173,7 @@ void Tracker::Implementation::takeBack(LoopUndo undo) {
   submaps_ = std::move(undo.submaps);
   loop_undo_.reset();
   loop_witness_.clear();
+  endLook();
 }
 
 /// A loop that was wrong shows in the images after it: they contradict the map, or other submaps
@@ -196,23 +213,6 @@ bool Tracker::Implementation::watchLoop(TrackedFrame* frame) {
   lose("a loop was closed that the images after it contradict: taken back, looking for the camera");
   frame->reason = reason_;
   return true;
-}
-
-/// While lost: in submaps, as in the active map.
-bool Tracker::Implementation::relocaliseInSubmaps(const cv::Mat& image, TrackedFrame* frame) {
-  if (!submaps_.isEnabled() || submaps_.tree().leaves().empty()) return false;
-  const auto positions = submaps_.positions(filter_);
-  for (const int submap : submaps_.inTurn(kSubmapsPerLookWhileLost)) {
-    const auto found =
-        relocaliser_.find(camera_, image, submaps_.landmarks(submap, positions), mask_);
-    if (!found) continue;
-    const int no_limit = map_.size() + submaps_.tree().frozenCount();
-    submaps_.activate(submap, last_stamp_s_, no_limit, &filter_, &map_);
-    placeCamera(*found, frame);
-    frame->reason = "found again in a submap that had been laid aside";
-    return true;
-  }
-  return false;
 }
 
 }  // namespace active_matching_slam

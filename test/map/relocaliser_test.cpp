@@ -120,6 +120,74 @@ TEST(Relocaliser, FindsTheCameraByLandmarksWhereverTheyAreKept) {
   EXPECT_FALSE(relocaliser.find(simulator.camera(), frame->image, landmarks));
 }
 
+std::vector<Landmark> landmarksOf(const KnownMap& known) {
+  std::vector<Landmark> landmarks;
+  for (const MapFeature& feature : known.map.features())
+    landmarks.push_back({&feature, *known.filter.find(feature.id)});
+  return landmarks;
+}
+
+TEST(Relocaliser, ALookInStepsFindsWhatOneAtOnceDoesAndNoStepIsMuchOfIt) {
+  SimulatorOptions options = sequence("room");
+  options.width = 640;
+  options.height = 480;
+  Simulator simulator(options);
+  const Relocaliser relocaliser({}, {}, {});
+  KnownMap known;
+  addFeatures(simulator, *simulator.next(), &known);
+  const std::vector<Landmark> landmarks = landmarksOf(known);
+  const cv::Mat image = simulator.next()->image;
+  CameraLook look(image);
+  double sum_ms = 0.0, most_ms = 0.0;
+  for (; !look.isOver(); relocaliser.step(simulator.camera(), landmarks, &look)) {
+    const double step_ms = Relocaliser::stepMs(landmarks, look);
+    sum_ms += step_ms;
+    most_ms = std::max(most_ms, step_ms);
+  }
+  EXPECT_LT(most_ms, 0.2 * sum_ms);
+  ASSERT_TRUE(look.pose());
+  const auto found =
+      relocaliser.prove(simulator.camera(), image, landmarks, *look.pose(), look.mask());
+  const auto expected = relocaliser.find(simulator.camera(), image, landmarks);
+  ASSERT_TRUE(found && expected);
+  EXPECT_EQ(found->T_world_camera.matrix(), expected->T_world_camera.matrix());
+}
+
+TEST(Relocaliser, LooksInAnotherPlaceByTheSameCorners) {
+  Simulator simulator(sequence("room"));
+  SimulatorOptions elsewhere = sequence("office");
+  elsewhere.seed = 5;
+  Simulator other(elsewhere);
+  const Relocaliser relocaliser({}, {}, {});
+  KnownMap here, there;
+  addFeatures(simulator, *simulator.next(), &here);
+  addFeatures(other, *other.next(), &there);
+  CameraLook look(simulator.next()->image);
+  int steps_there = 0, steps_here = 0;
+  for (; !look.isOver(); ++steps_there)
+    relocaliser.step(simulator.camera(), landmarksOf(there), &look);
+  look.beginPlace();
+  for (; !look.isOver(); ++steps_here)
+    relocaliser.step(simulator.camera(), landmarksOf(here), &look);
+  EXPECT_LT(steps_here, steps_there);
+  ASSERT_TRUE(look.pose());
+  EXPECT_TRUE(relocaliser.prove(simulator.camera(), look.image(), landmarksOf(here), *look.pose(),
+                                look.mask()));
+}
+
+TEST(Relocaliser, ALookEndsWhenItsLandmarksAreNoMore) {
+  Simulator simulator(sequence("room"));
+  const Relocaliser relocaliser({}, {}, {});
+  KnownMap known;
+  addFeatures(simulator, *simulator.next(), &known);
+  CameraLook look(simulator.next()->image);
+  relocaliser.step(simulator.camera(), landmarksOf(known), &look);
+  EXPECT_FALSE(look.isOver());
+  relocaliser.step(simulator.camera(), {}, &look);
+  EXPECT_TRUE(look.isOver());
+  EXPECT_FALSE(look.pose());
+}
+
 TEST(Relocaliser, SeesThroughTheLensAsItIsKnownByNow) {
   Simulator simulator(sequence("room"));
   CameraCalibration faulty = simulator.camera().calibration();

@@ -61,7 +61,8 @@ TEST(OneCalibration, ThatChangesIsTakenAtOnceAndAlsoBackAgain) {
   calibration.take(infoWithFocal(500.0), 0.0);
   calibration.take(infoWithFocal(300.0), 10.0);
   EXPECT_EQ(calibration.inUse()->K[0], 300.0);
-  for (double now_s = 10.0; now_s < 12.0; now_s += 0.03) calibration.take(infoWithFocal(300.0), now_s);
+  for (double now_s = 10.0; now_s < 12.0; now_s += 0.03)
+    calibration.take(infoWithFocal(300.0), now_s);
   EXPECT_TRUE(calibration.take(infoWithFocal(500.0), 12.0));
   EXPECT_EQ(calibration.inUse()->K[0], 500.0);
 }

@@ -241,6 +241,94 @@ TEST(Kidnapping, AMapThatCannotBeFoundAgainIsGivenUpAtOnce) {
   EXPECT_EQ(frames.back()->state, TrackingState::kTracking) << "in a new map";
 }
 
+/// Frames until the camera is found at home, where matching, and so a look, has `milliseconds` of
+/// each frame. The camera moves meanwhile.
+int framesUntilFound(double milliseconds) {
+  static const Film large = makeFilm(filmOptions(6.0, {640, 480}));
+  const Film film = putOff(large, kElsewhere / 30.0);
+  TrackerOptions options;
+  options.matching.max_milliseconds = milliseconds;
+  Tracker tracker(film.camera, options);
+  const Frames before = trackFrames(film, &tracker, 0, kCarriedOff);
+  const double begin_s = film.frames[kCarriedOff - 1].stamp_s;
+  for (int i = 0; i < kElsewhere; ++i) {  // dark, and none repeats the one before
+    cv::Mat dark(480, 640, CV_8UC1, cv::Scalar(0));
+    dark.at<std::uint8_t>(100, 100 + i) = 10;
+    tracker.track(dark, begin_s + (i + 1) / 30.0);
+  }
+  const Frames after = trackFrames(film, &tracker, kCarriedOff, 180);
+  const int found = firstTracked(after);
+  if (found < static_cast<int>(after.size())) {
+    EXPECT_EQ(after.back()->state, TrackingState::kTracking);
+    EXPECT_EQ(after.back()->map, 0);
+    expectOnePath(film, before, Frames(after.begin() + found, after.end()), kCarriedOff + found);
+  }
+  return found;
+}
+
+TEST(Kidnapping, ALookTakesSomeFramesAndTheCameraIsFoundWhereItHasGoneMeanwhile) {
+  const int at_once = framesUntilFound(0.0), in_steps = framesUntilFound(20.0);
+  std::cout << "found after " << at_once << " frames without, " << in_steps
+            << " with a bound of their time\n";
+  EXPECT_LT(at_once, in_steps);
+  EXPECT_LT(in_steps, 45);
+}
+
+TEST(Kidnapping, TwoMapsOfARoomAreJoinedWhenOneIsRecognisedFromTheOther) {
+  // One side of the view, the dark, the other side, and then all of it.
+  constexpr int kSide = 60, kDark = 20, kOtherSide = 70, kAll = 90;
+  const Film film = makeFilm(filmOptions((kSide + kDark + kOtherSide + kAll + 1) / 30.0));
+  const auto side = [](int left) {
+    cv::Mat mask(240, 320, CV_8UC1, cv::Scalar(0));
+    mask.colRange(left, left + 120).setTo(255);
+    return mask;
+  };
+  TrackerOptions options;
+  options.new_map_when_lost_after_s = 0.1;
+  Tracker tracker(film.camera, options);
+  tracker.setMask(side(200));
+  const Frames before = trackFrames(film, &tracker, 0, kSide);
+  EXPECT_EQ(before.back()->state, TrackingState::kTracking);
+  for (int i = kSide; i < kSide + kDark; ++i) {
+    cv::Mat dark(240, 320, CV_8UC1, cv::Scalar(0));
+    dark.at<std::uint8_t>(100, i) = 10;
+    tracker.track(dark, film.frames[i].stamp_s);
+  }
+  tracker.setMask(side(0));
+  const int other = kSide + kDark, all = other + kOtherSide;
+  const Frames beside = trackFrames(film, &tracker, other, all);
+  ASSERT_EQ(beside.back()->state, TrackingState::kTracking);
+  ASSERT_EQ(beside.back()->map, 1) << "nothing of the first map is in view";
+  tracker.setMask(cv::Mat());
+  const Frames after = trackFrames(film, &tracker, all, all + kAll);
+  const auto joined =
+      std::find_if(after.begin(), after.end(), [](const auto& frame) { return frame->map == 0; });
+  ASSERT_NE(joined, after.end());
+  const TrackedFrame& at = **joined;
+  const TrackedFrame& one_before = joined == after.begin() ? *beside.back() : **(joined - 1);
+  EXPECT_NE(at.reason.find("map 1 joined with map 0"), std::string::npos) << at.reason;
+  EXPECT_EQ(at.map_epoch, one_before.map_epoch + 1);
+  EXPECT_EQ(at.jumps, one_before.jumps + 1);
+  EXPECT_TRUE((at.map_jump * one_before.camera.poseWorldCamera()).matrix().allFinite());
+  EXPECT_GT(at.features.size(), before.back()->features.size()) << "it holds what both held";
+  for (auto frame = joined; frame != after.end(); ++frame) {
+    EXPECT_EQ((*frame)->state, TrackingState::kTracking);
+    EXPECT_EQ((*frame)->map, 0);
+    EXPECT_TRUE(isFinite(**frame));
+  }
+  // Features of the other map are matched, at once and with those of the first.
+  const auto next = joined + 3;
+  ASSERT_LT(next, after.end());
+  int matched_left = 0, matched_right = 0;
+  for (const TrackedFeature& feature : (*next)->features)
+    if (feature.status == FeatureStatus::kMatched)
+      ++(feature.matched_px.x() < 160.0 ? matched_left : matched_right);
+  EXPECT_GE(matched_left, 10);
+  EXPECT_GE(matched_right, 10);
+  const auto first = static_cast<int>(joined - after.begin());
+  expectOnePath(film, before, Frames(joined, after.end()), all + first);
+}
+
 /// A map file that is removed at the end.
 class SavedMap : public testing::Test {
  protected:

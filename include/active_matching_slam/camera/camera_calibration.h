@@ -45,9 +45,9 @@ std::vector<std::string> calibrationDoubts(const CameraCalibration& calibration)
 DistortionModel distortionModelFromName(const std::string& name);
 std::string distortionModelName(DistortionModel model);
 
-/// Reads a camera_info yaml file as written by camera_calibration; or one of Kalibr (its cam0), or
-/// of ORB-SLAM 2 or 3 (pinhole cameras and KannalaBrandt8). `rectified`: of the rectified image, by
-/// its projection_matrix. Throws std::runtime_error that names the file and the field at fault.
+/// Reads the yaml file of a camera: of camera_calibration, OpenCV, Kalibr (cam0), EuRoC, VINS or
+/// ORB-SLAM 2 or 3, or a camera_info message. `rectified`: of the rectified image, by its
+/// projection_matrix or P. Throws std::runtime_error that names the file and the field at fault.
 CameraCalibration readCalibrationYaml(const std::string& path, bool rectified = false);
 
 /// Calibration of the image that a camera with a region of interest and binning delivers, from that

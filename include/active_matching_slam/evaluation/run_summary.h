@@ -58,8 +58,8 @@ struct RunSummary {
   int truth_pairs = 0;         ///< tracked frames with a true pose
   std::optional<double> ate_sim3_m, ate_se3_m, sim3_scale;
   std::optional<double> ate_final_sim3_m;  ///< of RunReport::finalTrajectory()
-  std::optional<RelativePoseError> rpe;  ///< over 1 s; scaled as Sim(3) where the scale is free
-  std::optional<double> nees_mean;       ///< of the 6-D pose over the frames
+  std::optional<RelativePoseError> rpe;    ///< over 1 s; scaled as Sim(3) where the scale is free
+  std::optional<double> nees_mean;         ///< of the 6-D pose over the frames
   std::optional<double> nees_fraction_within;  ///< of frames within their own 95 % bounds
   Excursion excursion;
 
