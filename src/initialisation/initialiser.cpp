@@ -159,21 +159,8 @@ std::optional<InitialState> Initialiser::commit(const CameraModel& model, const 
   sigma_px_ = by_noise.sigma_px;
   committed_ = adjusted.ids;
   accepted_ = std::move(adjusted);
-  dropImageFixed(filter.options().sigma_px);
   if (parallax_ >= options_.last_parallax_deg * M_PI / 180.0) end();
   return state;
-}
-
-/// What keeps its pixel and is no point of the scene.
-void Initialiser::dropImageFixed(double sigma_px) {
-  for (const FeatureId id : keyframes_.keepTheirPixel(sigma_px)) {
-    if (isAdjusting(id)) continue;
-    for (auto keyframe = keyframes_.all().rbegin(); keyframe != keyframes_.all().rend(); ++keyframe)
-      if (const FeatureMeasurement* m = keyframe->find(id)) {
-        image_fixed_px_.push_back(m->pixel);
-        break;
-      }
-  }
 }
 
 }  // namespace active_matching_slam

@@ -167,6 +167,21 @@ void Keyframes::dropUnseen() {
     keyframes_.erase(keyframes_.begin());
 }
 
+void Keyframes::remove(const std::vector<FeatureId>& ids) {
+  for (Keyframe& keyframe : keyframes_) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < keyframe.measurements.size(); ++i) {
+      if (std::binary_search(ids.begin(), ids.end(), keyframe.measurements[i].id)) continue;
+      keyframe.measurements[kept] = keyframe.measurements[i];
+      if (i < keyframe.velocities_px_s.size())
+        keyframe.velocities_px_s[kept] = keyframe.velocities_px_s[i];
+      ++kept;
+    }
+    keyframe.measurements.resize(kept);
+    if (keyframe.velocities_px_s.size() > kept) keyframe.velocities_px_s.resize(kept);
+  }
+}
+
 void Keyframes::rescale(double factor) {
   for (Keyframe& keyframe : keyframes_) keyframe.T_world_camera.translation() *= factor;
 }

@@ -37,6 +37,35 @@ void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedF
   frame->features_retired += static_cast<int>(ids.size());
 }
 
+/// Features that turn out to be fixed to the image leave the map. True when they were most of what
+/// is seen: then poses were of the image rather than of the camera, and a map is begun without
+/// them.
+bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, TrackedFrame* frame) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (const FeatureMeasurement& measurement : current.measurements)
+    pixels.push_back(measurement.pixel);
+  if (!image_fixed_.add(camera_, current.image, last_stamp_s_, pixels, options_.image,
+                        mask_.patchCentres()) ||
+      !options_.mapping)
+    return false;
+  std::vector<FeatureId> ids;
+  for (const FeatureMeasurement& measurement : current.measurements)
+    if (image_fixed_.contains(measurement.pixel, options_.image) &&
+        !map_.find(measurement.id)->known)
+      ids.push_back(measurement.id);
+  if (2 * ids.size() > current.measurements.size()) {
+    const std::string reason =
+        "most features were fixed to the image, and not of the scene: started anew without them";
+    abandonMap(reason);
+    start(current.image, frame);
+    frame->reason = reason;
+    return true;
+  }
+  initialiser_.leaveOut(ids);
+  retire(ids, frame);
+  return false;
+}
+
 /// That the map may hold. What may be laid aside soon is not deleted now.
 int Tracker::Implementation::mostFeatures() const {
   return options_.map.maximum_features + (submaps_.isEnabled() ? SubmapKeeper::kSlack : 0);
@@ -199,7 +228,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
                                        point.w() * T_camera_world.translation());
     if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
   }
-  const auto& fixed = initialiser_.imageFixedPixels();
+  const auto& fixed = image_fixed_.pixels();
   occupied.insert(occupied.end(), fixed.begin(), fixed.end());
   const std::vector<Eigen::Vector2d> frozen = frozenPixels();
   occupied.insert(occupied.end(), frozen.begin(), frozen.end());

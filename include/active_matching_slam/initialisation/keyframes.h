@@ -51,6 +51,8 @@ class Keyframes {
   void addFirstSights(const std::vector<FeatureMeasurement>& measurements);
   /// The first keyframes go while the last two share too few points with them; at least two remain.
   void dropUnseen();
+  /// Forgets all measurements of these features, ascending.
+  void remove(const std::vector<FeatureId>& ids);
   void rescale(double factor);
 
   int size() const { return static_cast<int>(keyframes_.size()); }
