@@ -24,6 +24,9 @@ constexpr double kEpipolarSigmas = 1.96;
 /// Inliers below which an essential matrix is not believed. Derivation: three times its minimum of
 /// five, so that ten confirm it.
 constexpr int kLeastInliers = 15;
+/// Of the eigenvalues of a patch's structure tensor, from which on it is an edge. Standard: SIFT's
+/// (Lowe 2004, section 4.1), of the principal curvatures.
+constexpr float kEdgeRatio = 10.0F;
 /// Comparisons that must agree. Derivation: repeated texture deceives one, but not at two
 /// distances.
 constexpr int kAgreeing = 2;
@@ -43,6 +46,16 @@ double correlationAt(const cv::Mat& a, const cv::Mat& b, const Eigen::Vector2d& 
   cv::Mat score;
   cv::matchTemplate(a(window), b(window), score, cv::TM_CCOEFF_NORMED);
   return score.at<float>(0, 0);
+}
+
+/// Whether a patch, which lies in the image, looks the same when it moves along some line.
+bool isEdge(const cv::Mat& image, const Eigen::Vector2d& pixel, int size) {
+  cv::Mat eigen;
+  const cv::Rect window(static_cast<int>(pixel.x()) - size / 2,
+                        static_cast<int>(pixel.y()) - size / 2, size, size);
+  cv::cornerEigenValsAndVecs(image(window), eigen, size, 3);
+  const auto& middle = eigen.at<cv::Vec6f>(size / 2, size / 2);
+  return middle[1] * kEdgeRatio < middle[0];
 }
 
 cv::Point2d idealOf(const CameraModel& camera, const Eigen::Vector2d& pixel) {
@@ -80,7 +93,7 @@ void ImageFixedParts::take(const cv::Mat& image, const std::vector<Eigen::Vector
   any.corner_quality = 0.0;
   for (const Corner& corner :
        detectCorners(image, corners_px_, kMostCorners, options.template_size_px, any, centres))
-    corners_px_.push_back(corner.pixel);
+    if (!isEdge(image, corner.pixel, options.template_size_px)) corners_px_.push_back(corner.pixel);
 }
 
 bool ImageFixedParts::add(const CameraModel& camera, const cv::Mat& image, double stamp_s,
@@ -127,6 +140,7 @@ bool ImageFixedParts::add(const CameraModel& camera, const cv::Mat& image, doubl
         is_fixed[i] = !is_moved[i] && epipolarDistance(E, idealOf(camera, corners_px_[i])) > limit;
     }
   }
+  if (getenv("DBG")) fprintf(stderr, "t %.2f n %zu moved %ld tracked %zu fixed %ld suspects %zu known %zu\n", stamp_s, n, (long)moved, from.size(), (long)std::count(is_fixed.begin(), is_fixed.end(), true), suspects_.size(), fixed_px_.size());
   judge(is_moved, is_fixed, options);
   take(image, features, options, centres);
   return true;

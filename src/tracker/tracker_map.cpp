@@ -49,10 +49,11 @@ bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, Trac
       !options_.mapping)
     return false;
   std::vector<FeatureId> ids;
-  for (const FeatureMeasurement& measurement : current.measurements)
-    if (image_fixed_.contains(measurement.pixel, options_.image) &&
-        !map_.find(measurement.id)->known)
+  for (const FeatureMeasurement& measurement : current.measurements) {
+    const MapFeature* feature = map_.find(measurement.id);
+    if (feature && !feature->known && image_fixed_.contains(measurement.pixel, options_.image))
       ids.push_back(measurement.id);
+  }
   if (2 * ids.size() > current.measurements.size()) {
     const std::string reason =
         "most features were fixed to the image, and not of the scene: started anew without them";
