@@ -16,14 +16,13 @@ namespace {
 /// Least time between two comparisons [s]. Cost: how soon it is known; one takes half a frame.
 constexpr double kComparisonPeriodS = 0.2;
 constexpr int kMostCorners = 300;  ///< Cost: one in each 32 x 32 pixels of a 640 x 480 image
-constexpr double kMajority = 0.5;  ///< Derivation: by definition, most of the picture
 constexpr double kSurely = 0.999;  ///< that RANSAC meets a sample without outlier. Standard: OpenCV
 /// Epipolar distance of a static point, in standard deviations of the flow. Standard: chi-square
 /// with one degree of freedom, 95 % (Hartley and Zisserman 2004, table 4.2).
 constexpr double kEpipolarSigmas = 1.96;
 /// Inliers below which an essential matrix is not believed. Derivation: three times its minimum of
 /// five, so that ten confirm it.
-constexpr int kLeastInliers = 15;
+constexpr std::size_t kLeastInliers = 15;
 /// Of the eigenvalues of a patch's structure tensor, from which on it is an edge. Standard: SIFT's
 /// (Lowe 2004, section 4.1), of the principal curvatures.
 constexpr float kEdgeRatio = 10.0F;
@@ -31,21 +30,25 @@ constexpr float kEdgeRatio = 10.0F;
 /// distances.
 constexpr int kAgreeing = 2;
 
-/// Zero-mean normalised cross-correlation of the patches of two images around one pixel; 0 where
-/// there is none.
-double correlationAt(const cv::Mat& a, const cv::Mat& b, const Eigen::Vector2d& pixel, int size,
-                     double minimum_contrast) {
-  const cv::Rect window(static_cast<int>(pixel.x()) - size / 2,
-                        static_cast<int>(pixel.y()) - size / 2, size, size);
-  if ((window & cv::Rect(0, 0, a.cols, a.rows)) != window) return 0.0;
-  cv::Scalar mean, deviation;
-  for (const cv::Mat* image : {&a, &b}) {
-    cv::meanStdDev((*image)(window), mean, deviation);
-    if (deviation[0] < minimum_contrast) return 0.0;
-  }
-  cv::Mat score;
-  cv::matchTemplate(a(window), b(window), score, cv::TM_CCOEFF_NORMED);
-  return score.at<float>(0, 0);
+/// Where the patch around a pixel has texture and looks the same in both images, by zero-mean
+/// normalised cross-correlation: 255, else 0.
+cv::Mat whatStays(const cv::Mat& first, const cv::Mat& second, const ImageOptions& options) {
+  const auto mean = [&options](const cv::Mat& image) {
+    cv::Mat smooth;
+    cv::boxFilter(image, smooth, CV_32F, {options.template_size_px, options.template_size_px});
+    return smooth;
+  };
+  cv::Mat a, b;
+  first.convertTo(a, CV_32F);
+  second.convertTo(b, CV_32F);
+  const cv::Mat mean_a = mean(a), mean_b = mean(b);
+  const cv::Mat variance_a = mean(a.mul(a)) - mean_a.mul(mean_a);
+  const cv::Mat variance_b = mean(b.mul(b)) - mean_b.mul(mean_b);
+  const cv::Mat covariance = mean(a.mul(b)) - mean_a.mul(mean_b);
+  const double least = options.minimum_contrast * options.minimum_contrast;
+  const double score = options.match_threshold;
+  return (variance_a >= least) & (variance_b >= least) & (covariance > 0.0) &
+         (covariance.mul(covariance) >= score * score * variance_a.mul(variance_b));
 }
 
 /// Whether a patch, which lies in the image, looks the same when it moves along some line.
@@ -72,13 +75,44 @@ double epipolarDistance(const cv::Matx33d& E, const cv::Point2d& x) {
          std::sqrt(line[0] * line[0] + line[1] * line[1] + back[0] * back[0] + back[1] * back[1]);
 }
 
+/// By what most points say that were found in the second image; empty where they do not agree.
+/// `limit`: of the epipolar distance of an inlier.
+std::optional<cv::Matx33d> essentialMatrix(
+    const CameraModel& camera, const std::vector<std::optional<Eigen::Vector2d>>& from_px,
+    const std::vector<std::optional<Eigen::Vector2d>>& to_px, double limit) {
+  std::vector<cv::Point2d> from, to;
+  for (std::size_t i = 0; i < from_px.size(); ++i) {
+    if (!to_px[i]) continue;
+    const cv::Point2d a = idealOf(camera, *from_px[i]), b = idealOf(camera, *to_px[i]);
+    if (!std::isfinite(a.x) || !std::isfinite(b.x)) continue;
+    from.push_back(a);
+    to.push_back(b);
+  }
+  if (from.size() < kLeastInliers) return std::nullopt;
+  std::vector<uchar> is_inlier;
+  const cv::Mat E = cv::findEssentialMat(from, to, 1.0, cv::Point2d(0.0, 0.0), cv::RANSAC, kSurely,
+                                         limit, is_inlier);
+  const auto inliers = static_cast<std::size_t>(cv::countNonZero(is_inlier));
+  if (E.rows != 3 || inliers < kLeastInliers || 2 * inliers < from.size()) return std::nullopt;
+  return cv::Matx33d(E.ptr<double>());
+}
+
 }  // namespace
 
-bool ImageFixedParts::contains(const Eigen::Vector2d& pixel, const ImageOptions& options) const {
-  const double reach_px = 0.5 * options.template_size_px;
-  return std::any_of(fixed_px_.begin(), fixed_px_.end(), [&](const Eigen::Vector2d& fixed) {
-    return (fixed - pixel).cwiseAbs().maxCoeff() <= reach_px;
-  });
+bool ImageFixedParts::contains(const Eigen::Vector2d& pixel) const {
+  const cv::Point place(static_cast<int>(std::lround(pixel.x())),
+                        static_cast<int>(std::lround(pixel.y())));
+  return cv::Rect({}, fixed_.size()).contains(place) && fixed_.at<uchar>(place) != 0;
+}
+
+cv::Mat ImageFixedParts::sceneCentres(const cv::Mat& centres, const ImageOptions& options) const {
+  if (fixed_.empty()) return centres;
+  cv::Mat touching, scene;
+  cv::dilate(fixed_, touching,
+             cv::Mat::ones(options.template_size_px, options.template_size_px, CV_8U));
+  cv::bitwise_not(touching, scene);
+  if (!centres.empty()) cv::bitwise_and(scene, centres, scene);
+  return scene;
 }
 
 /// Makes an image the reference.
@@ -88,11 +122,12 @@ void ImageFixedParts::take(const cv::Mat& image, const std::vector<Eigen::Vector
   corners_px_.clear();
   for (const Suspect& suspect : suspects_) corners_px_.push_back(suspect.pixel);
   for (const Eigen::Vector2d& pixel : features) corners_px_.emplace_back(pixel.array().round());
+  first_spread_ = corners_px_.size();
   // Weak corners too: what is burnt in is often stronger than all of the scene.
   ImageOptions any = options;
   any.corner_quality = 0.0;
   for (const Corner& corner :
-       detectCorners(image, corners_px_, kMostCorners, options.template_size_px, any, centres))
+       detectCorners(image, {}, kMostCorners, options.template_size_px, any, centres))
     if (!isEdge(image, corner.pixel, options.template_size_px)) corners_px_.push_back(corner.pixel);
 }
 
@@ -107,41 +142,24 @@ bool ImageFixedParts::add(const CameraModel& camera, const cv::Mat& image, doubl
   if (stamp_s - last_stamp_s_ < kComparisonPeriodS) return false;
   last_stamp_s_ = stamp_s;
   const std::size_t n = corners_px_.size();
-  std::vector<bool> is_moved(n);
+  std::vector<bool> is_moved(n), is_fixed(n, false);
+  const cv::Mat stays = whatStays(reference_, image, options);
   for (std::size_t i = 0; i < n; ++i)
-    is_moved[i] = correlationAt(reference_, image, corners_px_[i], options.template_size_px,
-                                options.minimum_contrast) < options.match_threshold;
-  const auto moved = std::count(is_moved.begin(), is_moved.end(), true);
-  if (static_cast<double>(moved) < kMajority * static_cast<double>(n)) return false;
+    is_moved[i] = stays.at<uchar>(static_cast<int>(corners_px_[i].y()),
+                                  static_cast<int>(corners_px_[i].x())) == 0;
+  const auto spread = is_moved.begin() + static_cast<std::ptrdiff_t>(first_spread_);
+  if (std::count(spread, is_moved.end(), true) <= std::count(spread, is_moved.end(), false))
+    return false;
 
-  std::vector<std::optional<Eigen::Vector2d>> from_px(n);
+  std::vector<std::optional<Eigen::Vector2d>> moved_px(n);
   for (std::size_t i = 0; i < n; ++i)
-    if (is_moved[i]) from_px[i] = corners_px_[i];
-  const auto to_px = trackPoints(reference_, image, from_px);
-  std::vector<cv::Point2d> from, to;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!to_px[i]) continue;
-    const cv::Point2d a = idealOf(camera, *from_px[i]), b = idealOf(camera, *to_px[i]);
-    if (!std::isfinite(a.x) || !std::isfinite(b.x)) continue;
-    from.push_back(a);
-    to.push_back(b);
-  }
+    if (is_moved[i]) moved_px[i] = corners_px_[i];
   const double limit = kEpipolarSigmas * flowSigma_px(image.cols) / camera.calibration().fx;
-  std::vector<bool> is_fixed(n, false);
-  if (static_cast<int>(from.size()) >= kLeastInliers) {
-    std::vector<uchar> inliers;
-    const cv::Mat found = cv::findEssentialMat(from, to, 1.0, cv::Point2d(0.0, 0.0), cv::RANSAC,
-                                               kSurely, limit, inliers);
-    const int agreeing = cv::countNonZero(inliers);
-    if (found.rows == 3 && agreeing >= kLeastInliers &&
-        agreeing >= kMajority * static_cast<double>(from.size())) {
-      const cv::Matx33d E(found.ptr<double>());
-      for (std::size_t i = 0; i < n; ++i)
-        is_fixed[i] = !is_moved[i] && epipolarDistance(E, idealOf(camera, corners_px_[i])) > limit;
-    }
-  }
-  if (getenv("DBG")) fprintf(stderr, "t %.2f n %zu moved %ld tracked %zu fixed %ld suspects %zu known %zu\n", stamp_s, n, (long)moved, from.size(), (long)std::count(is_fixed.begin(), is_fixed.end(), true), suspects_.size(), fixed_px_.size());
+  const auto E = essentialMatrix(camera, moved_px, trackPoints(reference_, image, moved_px), limit);
+  for (std::size_t i = 0; E && i < n; ++i)
+    is_fixed[i] = !is_moved[i] && epipolarDistance(*E, idealOf(camera, corners_px_[i])) > limit;
   judge(is_moved, is_fixed, options);
+  grow(stays);
   take(image, features, options, centres);
   return true;
 }
@@ -164,9 +182,25 @@ void ImageFixedParts::judge(const std::vector<bool>& is_moved, const std::vector
   suspects_.erase(std::remove_if(suspects_.begin(), suspects_.end(),
                                  [](const Suspect& s) { return s.moved >= s.fixed; }),
                   suspects_.end());
-  fixed_px_.clear();
+}
+
+/// The parts that stayed, and that an agreed suspect lies in.
+void ImageFixedParts::grow(const cv::Mat& stays) {
+  fixed_.release();
+  std::vector<cv::Point> seeds;
   for (const Suspect& suspect : suspects_)
-    if (suspect.fixed >= kAgreeing) fixed_px_.push_back(suspect.pixel);
+    if (suspect.fixed >= kAgreeing)
+      seeds.emplace_back(static_cast<int>(suspect.pixel.x()), static_cast<int>(suspect.pixel.y()));
+  if (seeds.empty()) return;
+  cv::Mat part;
+  const int parts = cv::connectedComponents(stays, part);
+  std::vector<uchar> is_fixed(static_cast<std::size_t>(parts), 0);
+  for (const cv::Point& seed : seeds) is_fixed[static_cast<std::size_t>(part.at<int>(seed))] = 255;
+  is_fixed[0] = 0;  // what does not stay
+  fixed_.create(stays.size(), CV_8U);
+  for (int v = 0; v < stays.rows; ++v)
+    for (int u = 0; u < stays.cols; ++u)
+      fixed_.at<uchar>(v, u) = is_fixed[static_cast<std::size_t>(part.at<int>(v, u))];
 }
 
 }  // namespace active_matching_slam

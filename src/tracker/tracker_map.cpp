@@ -51,7 +51,7 @@ bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, Trac
   std::vector<FeatureId> ids;
   for (const FeatureMeasurement& measurement : current.measurements) {
     const MapFeature* feature = map_.find(measurement.id);
-    if (feature && !feature->known && image_fixed_.contains(measurement.pixel, options_.image))
+    if (feature && !feature->known && image_fixed_.contains(measurement.pixel))
       ids.push_back(measurement.id);
   }
   if (2 * ids.size() > current.measurements.size()) {
@@ -229,8 +229,6 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
                                        point.w() * T_camera_world.translation());
     if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
   }
-  const auto& fixed = image_fixed_.pixels();
-  occupied.insert(occupied.end(), fixed.begin(), fixed.end());
   const std::vector<Eigen::Vector2d> frozen = frozenPixels();
   occupied.insert(occupied.end(), frozen.begin(), frozen.end());
   const std::vector<DepthSample> known_depths = knownDepths(visible);
@@ -238,8 +236,9 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
       options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
   int started = 0;
   std::vector<FeatureMeasurement> first_sights;
+  const cv::Mat centres = image_fixed_.sceneCentres(mask_.patchCentres(), options_.image);
   for (const Corner& corner :
-       detectCorners(image, occupied, wanted, distance_px, options_.image, mask_.patchCentres())) {
+       detectCorners(image, occupied, wanted, distance_px, options_.image, centres)) {
     const auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
                                           options_.image.source_patch_size_px);
     if (!patch) continue;

@@ -27,10 +27,12 @@ class ImageFixedParts {
            const std::vector<Eigen::Vector2d>& features, const ImageOptions& options,
            const cv::Mat& centres = cv::Mat());
 
-  /// Corners that are fixed to the image.
-  const std::vector<Eigen::Vector2d>& pixels() const { return fixed_px_; }
-  /// Whether a template around `pixel` would show one of them.
-  bool contains(const Eigen::Vector2d& pixel, const ImageOptions& options) const;
+  bool isFound() const { return !fixed_.empty(); }
+  /// CV_8U of the image's size, 255: fixed to the image, 0: not known to be; empty: nothing is.
+  const cv::Mat& fixed() const { return fixed_; }
+  bool contains(const Eigen::Vector2d& pixel) const;
+  /// Of `centres`, those around which a template shows nothing that is fixed.
+  cv::Mat sceneCentres(const cv::Mat& centres, const ImageOptions& options) const;
 
  private:
   /// A corner that was found fixed once at least.
@@ -43,11 +45,15 @@ class ImageFixedParts {
   void judge(const std::vector<bool>& is_moved, const std::vector<bool>& is_fixed,
              const ImageOptions& options);
 
+  void grow(const cv::Mat& stays);
+
   cv::Mat reference_;
-  std::vector<Eigen::Vector2d> corners_px_;  ///< in it: whole numbers
-  double last_stamp_s_ = 0.0;                ///< of the last comparison, or the reference
+  /// In it, whole numbers: the suspects, features, and corners all over the image.
+  std::vector<Eigen::Vector2d> corners_px_;
+  std::size_t first_spread_ = 0;  ///< of those all over: they say what most of the picture does
+  double last_stamp_s_ = 0.0;     ///< of the last comparison, or the reference
   std::vector<Suspect> suspects_;
-  std::vector<Eigen::Vector2d> fixed_px_;
+  cv::Mat fixed_;
 };
 
 }  // namespace active_matching_slam
