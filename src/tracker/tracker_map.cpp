@@ -54,7 +54,7 @@ bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, Trac
     if (feature && !feature->known && image_fixed_.contains(measurement.pixel))
       ids.push_back(measurement.id);
   }
-  if (2 * ids.size() > current.measurements.size()) {
+  if (2 * ids.size() > current.measurements.size() || (!ids.empty() && !initialiser_.isDone())) {
     const std::string reason =
         "most features were fixed to the image, and not of the scene: started anew without them";
     abandonMap(reason);
