@@ -16,7 +16,7 @@ namespace {
 /// Least time between two comparisons [s]. Cost: how soon it is known; one takes half a frame.
 constexpr double kComparisonPeriodS = 0.2;
 constexpr int kMostCorners = 300;  ///< Cost: one in each 32 x 32 pixels of a 640 x 480 image
-constexpr double kSurely = 0.999;  ///< that RANSAC meets a sample without outlier. Standard: OpenCV
+constexpr double kSurely = 0.999;  ///< that a sample is met without outlier. Standard: OpenCV
 /// Epipolar distance of a static point, in standard deviations of the flow. Standard: chi-square
 /// with one degree of freedom, 95 % (Hartley and Zisserman 2004, table 4.2).
 constexpr double kEpipolarSigmas = 1.96;
@@ -67,11 +67,11 @@ cv::Point2d idealOf(const CameraModel& camera, const Eigen::Vector2d& pixel) {
   return {ray->x() / ray->z(), ray->y() / ray->z()};
 }
 
-/// Sampson distance of a point that is at `x` in both images (Hartley and Zisserman 2004,
-/// eq. 11.9).
-double epipolarDistance(const cv::Matx33d& E, const cv::Point2d& x) {
-  const cv::Vec3d point(x.x, x.y, 1.0), line = E * point, back = E.t() * point;
-  return std::abs(point.dot(line)) /
+/// Sampson distance of `from` in one image and `to` in the other (Hartley and Zisserman 2004, eq.
+/// 11.9).
+double epipolarDistance(const cv::Matx33d& E, const cv::Point2d& from, const cv::Point2d& to) {
+  const cv::Vec3d x(from.x, from.y, 1.0), y(to.x, to.y, 1.0), line = E * x, back = E.t() * y;
+  return std::abs(y.dot(line)) /
          std::sqrt(line[0] * line[0] + line[1] * line[1] + back[0] * back[0] + back[1] * back[1]);
 }
 
@@ -89,15 +89,27 @@ std::optional<cv::Matx33d> essentialMatrix(
     to.push_back(b);
   }
   if (from.size() < kLeastInliers) return std::nullopt;
-  std::vector<uchar> is_inlier;
-  const cv::Mat E = cv::findEssentialMat(from, to, 1.0, cv::Point2d(0.0, 0.0), cv::RANSAC, kSurely,
-                                         limit, is_inlier);
-  const auto inliers = static_cast<std::size_t>(cv::countNonZero(is_inlier));
-  if (E.rows != 3 || inliers < kLeastInliers || 2 * inliers < from.size()) return std::nullopt;
-  return cv::Matx33d(E.ptr<double>());
+  // Half of them may be wrong, and the bound of an inlier is far beyond the noise of most: the
+  // least median of squares (Rousseeuw 1984) asks for no more, and fits better than counting
+  // inliers.
+  const cv::Mat found =
+      cv::findEssentialMat(from, to, 1.0, cv::Point2d(0.0, 0.0), cv::LMEDS, kSurely, limit);
+  if (found.rows != 3) return std::nullopt;
+  const cv::Matx33d E(found.ptr<double>());
+  std::size_t inliers = 0;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    if (epipolarDistance(E, from[i], to[i]) <= limit) ++inliers;
+  if (inliers < kLeastInliers || 2 * inliers < from.size()) return std::nullopt;
+  return E;
 }
 
 }  // namespace
+
+double ImageFixedParts::share() const {
+  return fixed_.empty()
+             ? 0.0
+             : static_cast<double>(cv::countNonZero(fixed_)) / static_cast<double>(fixed_.total());
+}
 
 bool ImageFixedParts::contains(const Eigen::Vector2d& pixel) const {
   const cv::Point place(static_cast<int>(std::lround(pixel.x())),
@@ -156,8 +168,10 @@ bool ImageFixedParts::add(const CameraModel& camera, const cv::Mat& image, doubl
     if (is_moved[i]) moved_px[i] = corners_px_[i];
   const double limit = kEpipolarSigmas * flowSigma_px(image.cols) / camera.calibration().fx;
   const auto E = essentialMatrix(camera, moved_px, trackPoints(reference_, image, moved_px), limit);
-  for (std::size_t i = 0; E && i < n; ++i)
-    is_fixed[i] = !is_moved[i] && epipolarDistance(*E, idealOf(camera, corners_px_[i])) > limit;
+  for (std::size_t i = 0; E && i < n; ++i) {
+    const cv::Point2d ideal = idealOf(camera, corners_px_[i]);
+    is_fixed[i] = !is_moved[i] && epipolarDistance(*E, ideal, ideal) > limit;
+  }
   judge(is_moved, is_fixed, options);
   grow(stays);
   take(image, features, options, centres);

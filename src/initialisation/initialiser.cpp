@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <set>
 #include <utility>
 
 #include "hypothesis_test.h"
@@ -91,8 +90,7 @@ void Initialiser::disambiguate(const CameraModel& model, const Ekf& filter) {
                                                               : InitialiserState::kDisambiguating;
   last_parallax_ = std::min(last_parallax_, *parallax);  // what showed more may be out of sight
   if (state_ == InitialiserState::kCollecting || !hasGrown(*parallax)) return;
-  const std::set<FeatureId> fixed = keyframes_.keepTheirPixel(options.sigma_px);
-  auto rotation_only = keyframes_.rotationOnly(model, fixed);
+  auto rotation_only = keyframes_.rotationOnly(model);
   if (!rotation_only) return;
   auto test = testMotions(model, options_, options, rotation_only->bundle);
   if (!test) return;

@@ -37,9 +37,9 @@ void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedF
   frame->features_retired += static_cast<int>(ids.size());
 }
 
-/// Features that turn out to be fixed to the image leave the map. True when they were most of what
-/// is seen: then poses were of the image rather than of the camera, and a map is begun without
-/// them.
+/// Features that turn out to be fixed to the image leave the map. True when a map is begun without
+/// them: where they took part in its initialisation, which took all that it saw for one scene, and
+/// where they are most of what is matched, so that poses were of the image rather than the camera.
 bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, TrackedFrame* frame) {
   std::vector<Eigen::Vector2d> pixels;
   for (const FeatureMeasurement& measurement : current.measurements)
@@ -54,17 +54,17 @@ bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, Trac
     if (feature && !feature->known && image_fixed_.contains(measurement.pixel))
       ids.push_back(measurement.id);
   }
-  if (2 * ids.size() > current.measurements.size() || (!ids.empty() && !initialiser_.isDone())) {
-    const std::string reason =
-        "most features were fixed to the image, and not of the scene: started anew without them";
-    abandonMap(reason);
-    start(current.image, frame);
-    frame->reason = reason;
-    return true;
+  const bool is_most = 2 * ids.size() > current.measurements.size();
+  if (ids.empty() || (initialiser_.isDone() && !is_most)) {
+    retire(ids, frame);
+    return false;
   }
-  initialiser_.leaveOut(ids);
-  retire(ids, frame);
-  return false;
+  const std::string reason =
+      "features were fixed to the image, and not of the scene: started anew without them";
+  abandonMap(reason);
+  start(current.image, frame);
+  frame->reason = reason;
+  return true;
 }
 
 /// That the map may hold. What may be laid aside soon is not deleted now.

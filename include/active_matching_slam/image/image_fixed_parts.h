@@ -12,7 +12,7 @@ namespace active_matching_slam {
 /// Finds what is fixed to the image and no part of the scene: burnt-in text, the dots of a
 /// projector beside the lens, dirt, a gripper or the robot itself. Two images are compared, between
 /// which most of the picture has moved. What has moved gives their essential matrix (5 points,
-/// RANSAC; Nister 2004). A patch that looks the same at the same pixel, where no static point of
+/// LMedS; Nister 2004). A patch that looks the same at the same pixel, where no static point of
 /// the scene may be by that matrix, is fixed. What obeys it, as all that is far away does while
 /// nothing rotates, is not judged; nor is anything while most of the picture stays. Poses and map
 /// play no part, so that it holds for a start as well, and where most features are of such parts.
@@ -27,7 +27,7 @@ class ImageFixedParts {
            const std::vector<Eigen::Vector2d>& features, const ImageOptions& options,
            const cv::Mat& centres = cv::Mat());
 
-  bool isFound() const { return !fixed_.empty(); }
+  double share() const;  ///< of the image's pixels
   /// CV_8U of the image's size, 255: fixed to the image, 0: not known to be; empty: nothing is.
   const cv::Mat& fixed() const { return fixed_; }
   bool contains(const Eigen::Vector2d& pixel) const;

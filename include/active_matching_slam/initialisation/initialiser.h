@@ -66,8 +66,6 @@ class Initialiser {
   }
   /// The second image, which was added last, has nothing to do with the first: start from it.
   bool isFirstUnrelated() const { return is_first_unrelated_; }
-  /// Forgets all measurements of features that turned out to be no part of the scene. `ids` ascend.
-  void leaveOut(const std::vector<FeatureId>& ids) { keyframes_.remove(ids); }
 
   /// Adds the matches of an image; `filter` is what was made of it.
   void add(const CameraModel& model, const KeyframeMeasurements& image, const Ekf& filter);
@@ -96,9 +94,9 @@ class Initialiser {
   std::optional<MotionHypothesis> accepted_;
   ScaleGauge scale_;
   std::vector<FeatureId> committed_;  ///< features of the last commit, ascending
-  double sigma_px_ = 0.0;       ///< of image points, by the accepted hypothesis
-  double parallax_ = 0.0;       ///< [rad], now
-  double last_parallax_ = 0.0;  ///< when last tested or adjusted
+  double sigma_px_ = 0.0;             ///< of image points, by the accepted hypothesis
+  double parallax_ = 0.0;             ///< [rad], now
+  double last_parallax_ = 0.0;        ///< when last tested or adjusted
   int images_ = 0, last_images_ = 0;
   int adjusting_images_ = 0;  ///< that the adjustment in hand has taken; 0: none is
   bool is_last_added_ = false, is_first_unrelated_ = false;
