@@ -51,6 +51,22 @@ cv::Mat whatStays(const cv::Mat& first, const cv::Mat& second, const ImageOption
          (covariance.mul(covariance) >= score * score * variance_a.mul(variance_b));
 }
 
+/// Whether a patch is found at its own pixel rather than beside it: one that is not sharp looks the
+/// same a pixel away.
+bool isBestWhereItWas(const cv::Mat& first, const cv::Mat& second, const Eigen::Vector2d& pixel,
+                      const ImageOptions& options) {
+  const int size = options.template_size_px;
+  const cv::Rect window(static_cast<int>(pixel.x()) - size / 2,
+                        static_cast<int>(pixel.y()) - size / 2, size, size);
+  const cv::Rect around(window.x - 1, window.y - 1, size + 2, size + 2);
+  if ((around & cv::Rect({}, first.size())) != around) return false;
+  cv::Mat scores;
+  cv::matchTemplate(second(around), first(window), scores, cv::TM_CCOEFF_NORMED);
+  cv::Point best;
+  cv::minMaxLoc(scores, nullptr, nullptr, nullptr, &best);
+  return best == cv::Point(1, 1);
+}
+
 /// Whether a patch, which lies in the image, looks the same when it moves along some line.
 bool isEdge(const cv::Mat& image, const Eigen::Vector2d& pixel, int size) {
   cv::Mat eigen;
@@ -169,8 +185,9 @@ bool ImageFixedParts::add(const CameraModel& camera, const cv::Mat& image, doubl
   const double limit = kEpipolarSigmas * flowSigma_px(image.cols) / camera.calibration().fx;
   const auto E = essentialMatrix(camera, moved_px, trackPoints(reference_, image, moved_px), limit);
   for (std::size_t i = 0; E && i < n; ++i) {
+    if (is_moved[i] || !isBestWhereItWas(reference_, image, corners_px_[i], options)) continue;
     const cv::Point2d ideal = idealOf(camera, corners_px_[i]);
-    is_fixed[i] = !is_moved[i] && epipolarDistance(*E, ideal, ideal) > limit;
+    is_fixed[i] = epipolarDistance(*E, ideal, ideal) > limit;
   }
   judge(is_moved, is_fixed, options);
   grow(stays);

@@ -18,6 +18,8 @@ constexpr int kLargeMapSnapshotFrames = 5;
 /// Relative standard deviation of an inverse depth below which it counts as known. Derivation:
 /// infinity is five sigma away.
 constexpr double kKnownDepthSigma = 0.2;
+/// Features from which on a pose of their own fits them. Derivation: three points, P3P.
+constexpr std::size_t kFeaturesOfPose = 3;
 /// Whose median inverse depth a new feature takes. Derivation: the fewest whose median two outliers
 /// can't move away.
 constexpr std::ptrdiff_t kNeighbours = 5;
@@ -38,8 +40,9 @@ void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedF
 }
 
 /// Features that turn out to be fixed to the image leave the map. True when a map is begun without
-/// them: where they took part in its initialisation, which took all that it saw for one scene, and
-/// where they are most of what is matched, so that poses were of the image rather than the camera.
+/// them: where enough for a pose took part in its initialisation, which took all that it saw for
+/// one scene, and where they are most of what is matched, so that poses were of the image rather
+/// than the camera.
 bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, TrackedFrame* frame) {
   std::vector<Eigen::Vector2d> pixels;
   for (const FeatureMeasurement& measurement : current.measurements)
@@ -55,7 +58,7 @@ bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, Trac
       ids.push_back(measurement.id);
   }
   const bool is_most = 2 * ids.size() > current.measurements.size();
-  if (ids.empty() || (initialiser_.isDone() && !is_most)) {
+  if (!is_most && (initialiser_.isDone() || ids.size() < kFeaturesOfPose)) {
     retire(ids, frame);
     return false;
   }
