@@ -15,7 +15,8 @@ namespace {
 
 /// Least time between two comparisons [s]. Cost: how soon it is known; one takes half a frame.
 constexpr double kComparisonPeriodS = 0.2;
-constexpr int kMostCorners = 300;  ///< Cost: one in each 32 x 32 pixels of a 640 x 480 image
+constexpr std::size_t kMostCorners =
+    300;                           ///< Cost: one in each 32 x 32 pixels of a 640 x 480 image
 constexpr double kSurely = 0.999;  ///< that a sample is met without outlier. Standard: OpenCV
 /// Epipolar distance of a static point, in standard deviations of the flow. Standard: chi-square
 /// with one degree of freedom, 95 % (Hartley and Zisserman 2004, table 4.2).
@@ -154,8 +155,8 @@ void ImageFixedParts::take(const cv::Mat& image, const std::vector<Eigen::Vector
   // Weak corners too: what is burnt in is often stronger than all of the scene.
   ImageOptions any = options;
   any.corner_quality = 0.0;
-  for (const Corner& corner :
-       detectCorners(image, {}, kMostCorners, options.template_size_px, any, centres))
+  for (const Corner& corner : detectCorners(image, {}, static_cast<int>(kMostCorners),
+                                            options.template_size_px, any, centres))
     if (!isEdge(image, corner.pixel, options.template_size_px)) corners_px_.push_back(corner.pixel);
 }
 
@@ -215,7 +216,8 @@ void ImageFixedParts::judge(const std::vector<bool>& is_moved, const std::vector
                   suspects_.end());
 }
 
-/// The parts that stayed, and that an agreed suspect lies in.
+/// The parts that stayed around an agreed suspect, and no farther from it than the next corner
+/// would be: where little has moved yet, some of the scene hangs together with it.
 void ImageFixedParts::grow(const cv::Mat& stays) {
   fixed_.release();
   std::vector<cv::Point> seeds;
@@ -223,7 +225,11 @@ void ImageFixedParts::grow(const cv::Mat& stays) {
     if (suspect.fixed >= kAgreeing)
       seeds.emplace_back(static_cast<int>(suspect.pixel.x()), static_cast<int>(suspect.pixel.y()));
   if (seeds.empty()) return;
-  cv::Mat part;
+  const int reach_px = static_cast<int>(std::lround(std::sqrt(stays.total() / kMostCorners)));
+  cv::Mat near = cv::Mat::zeros(stays.size(), CV_8U), part;
+  for (const cv::Point& seed : seeds)
+    cv::rectangle(near, seed - cv::Point(reach_px, reach_px), seed + cv::Point(reach_px, reach_px),
+                  255, cv::FILLED);
   const int parts = cv::connectedComponents(stays, part);
   std::vector<uchar> is_fixed(static_cast<std::size_t>(parts), 0);
   for (const cv::Point& seed : seeds) is_fixed[static_cast<std::size_t>(part.at<int>(seed))] = 255;
@@ -232,6 +238,7 @@ void ImageFixedParts::grow(const cv::Mat& stays) {
   for (int v = 0; v < stays.rows; ++v)
     for (int u = 0; u < stays.cols; ++u)
       fixed_.at<uchar>(v, u) = is_fixed[static_cast<std::size_t>(part.at<int>(v, u))];
+  cv::bitwise_and(fixed_, near, fixed_);
 }
 
 }  // namespace active_matching_slam

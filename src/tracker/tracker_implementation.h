@@ -129,7 +129,6 @@ class Tracker::Implementation {
   void closeLoop(int submap, const Relocalisation& found, const CameraOffset& offset,
                  TrackedFrame* frame);
   bool watchLoop(TrackedFrame* frame);
-  bool relocaliseInSubmaps(const cv::Mat& image, TrackedFrame* frame);
   bool leaveOutImageFixed(const FrameState& current, TrackedFrame* frame);
   void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
