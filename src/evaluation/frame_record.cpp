@@ -51,6 +51,7 @@ FrameRecord recordOf(const TrackedFrame& frame) {
   record.loops = frame.loops;
   record.map_epoch = frame.map_epoch;
   record.quality = frame.quality;
+  record.image_fixed = frame.image_fixed;
   record.quality_reason = frame.quality_reason;
   record.accelerations = frame.accelerations;
   record.late_images = frame.late_images;

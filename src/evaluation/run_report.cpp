@@ -78,6 +78,7 @@ void addStateColumns(const FrameErrors& errors, std::vector<Column>* columns) {
       column("motion_source", &FrameRecord::motion_source),
       column("motion_fault", &FrameRecord::motion_fault),
       column("quality", &FrameRecord::quality),
+      column("image_fixed", &FrameRecord::image_fixed),
       column("quality_reason", &FrameRecord::quality_reason),
       column("acceleration_mps2", [](R r) { return r.accelerations.linear_mps2; }),
       column("angular_acceleration_rps2", [](R r) { return r.accelerations.angular_rps2; })};

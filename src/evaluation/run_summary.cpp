@@ -164,7 +164,7 @@ void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summ
   }
   summary->untracked_reason = mostFrequent(untracked);
   std::set<int> maps;
-  std::vector<double> qualities;
+  std::vector<double> qualities, fixed;
   std::map<std::string, int> causes;
   summary->main_map = mainMap(records);
   for (const FrameRecord& record : records) {
@@ -172,10 +172,12 @@ void summariseMatching(const std::vector<FrameRecord>& records, RunSummary* summ
     maps.insert(record.map);
     if (record.map == summary->main_map) ++summary->frames_in_main_map;
     qualities.push_back(record.quality);
+    fixed.push_back(record.image_fixed);
     if (!record.quality_reason.empty()) ++causes[record.quality_reason];
   }
   summary->maps = static_cast<int>(maps.size());
   if (!qualities.empty()) summary->quality = percentile(std::move(qualities), 0.5);
+  if (!fixed.empty()) summary->image_fixed = percentile(std::move(fixed), 0.5);
   summary->quality_reason = mostFrequent(causes);
   if (summary->frames_tracked > 0) {
     summary->matched_mean = matched / summary->frames_tracked;

@@ -26,6 +26,7 @@ std::string summaryJson(const RunSummary& s) {
   json["main_map"] = s.main_map;
   json["frames_in_main_map"] = s.frames_in_main_map;
   json["quality"] = s.quality;
+  json["image_fixed"] = s.image_fixed;
   json["quality_reason"] = s.quality_reason;
   json["late_images"] = s.late_images;
   json["untracked_reason"] = s.untracked_reason;

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <set>
 #include <utility>
 
 #include "hypothesis_test.h"
@@ -91,8 +90,7 @@ void Initialiser::disambiguate(const CameraModel& model, const Ekf& filter) {
                                                               : InitialiserState::kDisambiguating;
   last_parallax_ = std::min(last_parallax_, *parallax);  // what showed more may be out of sight
   if (state_ == InitialiserState::kCollecting || !hasGrown(*parallax)) return;
-  const std::set<FeatureId> fixed = keyframes_.keepTheirPixel(options.sigma_px);
-  auto rotation_only = keyframes_.rotationOnly(model, fixed);
+  auto rotation_only = keyframes_.rotationOnly(model);
   if (!rotation_only) return;
   auto test = testMotions(model, options_, options, rotation_only->bundle);
   if (!test) return;
@@ -159,21 +157,8 @@ std::optional<InitialState> Initialiser::commit(const CameraModel& model, const 
   sigma_px_ = by_noise.sigma_px;
   committed_ = adjusted.ids;
   accepted_ = std::move(adjusted);
-  dropImageFixed(filter.options().sigma_px);
   if (parallax_ >= options_.last_parallax_deg * M_PI / 180.0) end();
   return state;
-}
-
-/// What keeps its pixel and is no point of the scene.
-void Initialiser::dropImageFixed(double sigma_px) {
-  for (const FeatureId id : keyframes_.keepTheirPixel(sigma_px)) {
-    if (isAdjusting(id)) continue;
-    for (auto keyframe = keyframes_.all().rbegin(); keyframe != keyframes_.all().rend(); ++keyframe)
-      if (const FeatureMeasurement* m = keyframe->find(id)) {
-        image_fixed_px_.push_back(m->pixel);
-        break;
-      }
-  }
 }
 
 }  // namespace active_matching_slam

@@ -182,35 +182,6 @@ std::optional<double> Keyframes::parallax(const CameraModel& model) const {
   return largest;
 }
 
-std::set<FeatureId> Keyframes::keepTheirPixel(double sigma_px) const {
-  struct Track {
-    std::size_t first;  ///< keyframe
-    Eigen::Vector2d first_px;
-    double moved_px = 0.0, median_moved_px = 0.0;  ///< at most; of all that it shares images with
-  };
-  std::map<FeatureId, Track> tracks;
-  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    std::map<std::size_t, double> medians_px;  // since keyframe
-    for (const FeatureMeasurement& m : keyframes_[k].measurements) {
-      const auto [it, is_new] = tracks.emplace(m.id, Track{k, m.pixel});
-      if (is_new) continue;
-      Track& track = it->second;
-      track.moved_px = std::max(track.moved_px, (m.pixel - track.first_px).norm());
-      const auto [median, is_unknown] = medians_px.emplace(track.first, 0.0);
-      if (is_unknown)
-        median->second = medianOf(
-            matchMotions(keyframes_[track.first].measurements, keyframes_[k].measurements));
-      track.median_moved_px = std::max(track.median_moved_px, median->second);
-    }
-  }
-  std::set<FeatureId> ids;
-  for (const auto& [id, track] : tracks)
-    if (track.moved_px < options_.image_fixed_sigmas * sigma_px &&
-        track.median_moved_px > options_.image_moved_sigmas * sigma_px)
-      ids.insert(id);
-  return ids;
-}
-
 /// Whether every keyframe shares enough points with the one before.
 bool Keyframes::isConnected(const Bundle& bundle) const {
   std::vector<bool> before(bundle.features.size());
@@ -229,8 +200,8 @@ bool Keyframes::isConnected(const Bundle& bundle) const {
 
 /// Image points of the `chosen` keyframes, of features with enough of them; cameras and features as
 /// they are made.
-MotionHypothesis Keyframes::observationsOf(const CameraModel& model, const std::vector<int>& chosen,
-                                           const std::set<FeatureId>& without) const {
+MotionHypothesis Keyframes::observationsOf(const CameraModel& model,
+                                           const std::vector<int>& chosen) const {
   std::map<FeatureId, int> sightings;
   // Of a feature's noise its last match says most; of an image's as a whole nothing is assumed
   // here: estimateImageVariances().
@@ -246,7 +217,7 @@ MotionHypothesis Keyframes::observationsOf(const CameraModel& model, const std::
   }
   MotionHypothesis hypothesis;
   for (const auto& [id, count] : sightings)
-    if (count >= options_.minimum_sightings && without.count(id) == 0) hypothesis.ids.push_back(id);
+    if (count >= options_.minimum_sightings) hypothesis.ids.push_back(id);
   Bundle& bundle = hypothesis.bundle;
   bundle.features.resize(hypothesis.ids.size());
   bundle.cameras.resize(chosen.size());
@@ -270,14 +241,13 @@ MotionHypothesis Keyframes::observationsOf(const CameraModel& model, const std::
   return hypothesis;
 }
 
-std::optional<MotionHypothesis> Keyframes::rotationOnly(const CameraModel& model,
-                                                        const std::set<FeatureId>& without) const {
+std::optional<MotionHypothesis> Keyframes::rotationOnly(const CameraModel& model) const {
   const int last = size() - 1, count = static_cast<int>(options_.candidate_keyframes);
   const int step = std::max(1, (last + count - 2) / (count - 1));
   std::vector<int> chosen;
   for (int k = last; k > 0; k -= step) chosen.insert(chosen.begin(), k);
   chosen.insert(chosen.begin(), 0);
-  MotionHypothesis hypothesis = observationsOf(model, chosen, without);
+  MotionHypothesis hypothesis = observationsOf(model, chosen);
   Bundle& bundle = hypothesis.bundle;
   if (!isConnected(bundle)) return std::nullopt;
   std::vector<bool> is_known(bundle.features.size());
@@ -334,7 +304,7 @@ std::optional<MotionHypothesis> Keyframes::extend(const CameraModel& model,
                                                   const MotionHypothesis& known) const {
   std::vector<int> chosen;
   for (int k = 0; k < size(); ++k) chosen.push_back(k);
-  MotionHypothesis all = observationsOf(model, chosen, {});
+  MotionHypothesis all = observationsOf(model, chosen);
   Bundle& bundle = all.bundle;
   const bool is_first_known = !known.images.empty() && known.images.front() == all.images.front();
   if (!isConnected(bundle) || !is_first_known || known.images.size() < 2) return std::nullopt;

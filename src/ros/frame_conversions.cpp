@@ -130,6 +130,7 @@ ams_msgs::MatchingStatistics toStatisticsMsg(const TrackedFrame& frame,
   message.nis = finiteOrZero(frame.nis);
   message.nis_degrees = frame.nis_degrees;
   message.quality = finiteOrZero(frame.quality);
+  message.image_fixed = frame.image_fixed;
   message.acceleration_mps2 = frame.accelerations.linear_mps2;
   message.angular_acceleration_rps2 = frame.accelerations.angular_rps2;
   message.match_sigma_px = frame.match_sigma_px;

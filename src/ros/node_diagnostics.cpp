@@ -46,6 +46,7 @@ void NodeDiagnostics::record(const TrackedFrame& frame, double latency_s, double
   times_lost_ = frame.times_lost;
   map_ = frame.map;
   quality_ = frame.quality;
+  image_fixed_ = frame.image_fixed;
   quality_reason_ = frame.quality_reason;
 }
 
@@ -128,6 +129,7 @@ void NodeDiagnostics::reportTracking(Status& status) {
   status.add("times lost", times_lost_);
   status.add("map", map_);
   status.addf("quality, 0 to 1", "%.2f", quality_);
+  status.addf("fixed to the image, and no scene [%]", "%.1f", 100.0 * image_fixed_);
 }
 
 void NodeDiagnostics::forgetInterval() {

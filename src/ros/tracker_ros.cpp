@@ -130,6 +130,7 @@ void TrackerRos::track(const CameraImage& image) {
   last_frame_ = frame;
   noticeChanges(*frame, image.header().stamp);
   noticeScale(*frame);
+  noticeImageFixed(*frame);
   publisher_.publishState(*frame, image.header().stamp, noticeMotion(*frame));
   if (!session_.fault().empty()) return;
   publish(*frame, image);
@@ -211,6 +212,10 @@ void TrackerRos::noticeScale(const TrackedFrame& frame) {
                                                           << "; its scale is known to "
                                                           << 100.0 * frame.scale_sigma << " %");
   if (!frame.scale_fault.empty()) scale_warning_.say(frame.scale_fault);
+}
+
+void TrackerRos::noticeImageFixed(const TrackedFrame& frame) {
+  if (frame.image_fixed > 0.0) image_fixed_warning_.say(imageFixedMessage(frame.image_fixed));
 }
 
 void TrackerRos::forgetPast(bool time_jumped) {

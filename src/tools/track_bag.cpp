@@ -209,6 +209,7 @@ void printSummary(const RunSummary& s, const std::string& scale_fault) {
                 s.durations.back().p99_ms);
   if (s.frames_tracked > 0) std::printf("\nquality %.2f", s.quality);
   if (!s.quality_reason.empty()) std::printf(": %s", s.quality_reason.c_str());
+  if (s.image_fixed > 0.0) std::printf("\n%s", imageFixedMessage(s.image_fixed).c_str());
   if (s.frames_with_motion + s.frames_without_motion > 0) {
     std::printf("\nmotion told in %d frames, taken for slip in %d", s.frames_with_motion,
                 s.frames_slipped);

@@ -1,6 +1,8 @@
 #include "active_matching_slam/tracker/tracked_frame.h"
 
 #include <algorithm>
+#include <iomanip>
+#include <sstream>
 #include <utility>
 
 #include "active_matching_slam/information/chow_liu_tree.h"
@@ -79,6 +81,15 @@ std::unordered_map<FeatureId, double> predictedInformationBits(const TrackedFram
   return bits_of;
 }
 
+std::string imageFixedMessage(double share) {
+  if (!(share > 0.0)) return "";
+  std::ostringstream message;
+  message << std::setprecision(2) << 100.0 * share
+          << " % of the image is fixed to it and no part of the scene (burnt-in text, dirt, the "
+             "robot itself): it is left out";
+  return message.str();
+}
+
 double treeDivergenceBits(const TrackedFrame& frame) {
   if (frame.matching.tree_edges.empty()) return 0.0;
   std::vector<WeightedEdge> edges;
@@ -116,6 +127,11 @@ void Tracker::Implementation::describeState(TrackedFrame* frame) const {
   frame->quality_reason = quality_.cause();
   frame->accelerations = motion_noise_.expected();
   frame->late_images = late_images_;
+  frame->image_fixed = image_fixed_.share();
+  if (frame->image_fixed > 0.0) {
+    cv::bitwise_not(image_fixed_.fixed(), frame->mask);
+    if (!mask_.isWhole()) cv::bitwise_and(frame->mask, mask_.used(), frame->mask);
+  }
   for (const MapFeature& feature : map_.features()) {
     const FeatureState& state = *filter_.find(feature.id);
     TrackedFeature out;

@@ -178,7 +178,8 @@ FrameState Tracker::Implementation::follow(const cv::Mat& image, double interval
   correct(&current, frame);
   const bool is_restarted = initialise(current, frame);
   frame->timings_ms.update = stage.lap();
-  if (is_restarted || giveUpWrongMap(current, frame)) return current;
+  if (is_restarted || leaveOutImageFixed(current, frame) || giveUpWrongMap(current, frame))
+    return current;
   updateTrackingState(current);
   findScale(frame);
   scaleByGround(frame);

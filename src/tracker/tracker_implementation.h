@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "active_matching_slam/filter/motion_noise.h"
+#include "active_matching_slam/image/image_fixed_parts.h"
 #include "active_matching_slam/image/target_detector.h"
 #include "active_matching_slam/image/working_size.h"
 #include "active_matching_slam/information/map_structure.h"
@@ -128,6 +129,7 @@ class Tracker::Implementation {
   void closeLoop(int submap, const Relocalisation& found, const CameraOffset& offset,
                  TrackedFrame* frame);
   bool watchLoop(TrackedFrame* frame);
+  bool leaveOutImageFixed(const FrameState& current, TrackedFrame* frame);
   void retakePatches(const FrameState& current);
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);
@@ -230,6 +232,7 @@ class Tracker::Implementation {
   CameraModel camera_;  ///< of images of the working size
   TrackerOptions options_;
   ImageMask mask_;
+  ImageFixedParts image_fixed_;
   Ekf filter_;
   FrameNoise noise_;
   MotionNoise motion_noise_;

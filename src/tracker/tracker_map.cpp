@@ -18,6 +18,8 @@ constexpr int kLargeMapSnapshotFrames = 5;
 /// Relative standard deviation of an inverse depth below which it counts as known. Derivation:
 /// infinity is five sigma away.
 constexpr double kKnownDepthSigma = 0.2;
+/// Features from which on a pose of their own fits them. Derivation: three points, P3P.
+constexpr std::size_t kFeaturesOfPose = 3;
 /// Whose median inverse depth a new feature takes. Derivation: the fewest whose median two outliers
 /// can't move away.
 constexpr std::ptrdiff_t kNeighbours = 5;
@@ -35,6 +37,37 @@ void Tracker::Implementation::retire(const std::vector<FeatureId>& ids, TrackedF
   filter_.removeFeatures(ids);
   map_.retire(ids);
   frame->features_retired += static_cast<int>(ids.size());
+}
+
+/// Features that turn out to be fixed to the image leave the map. True when a map is begun without
+/// them: where enough for a pose took part in its initialisation, which took all that it saw for
+/// one scene, and where they are most of what is matched, so that poses were of the image rather
+/// than the camera.
+bool Tracker::Implementation::leaveOutImageFixed(const FrameState& current, TrackedFrame* frame) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (const FeatureMeasurement& measurement : current.measurements)
+    pixels.push_back(measurement.pixel);
+  if (!image_fixed_.add(camera_, current.image, last_stamp_s_, pixels, options_.image,
+                        mask_.patchCentres()) ||
+      !options_.mapping)
+    return false;
+  std::vector<FeatureId> ids;
+  for (const FeatureMeasurement& measurement : current.measurements) {
+    const MapFeature* feature = map_.find(measurement.id);
+    if (feature && !feature->known && image_fixed_.contains(measurement.pixel))
+      ids.push_back(measurement.id);
+  }
+  const bool is_most = 2 * ids.size() > current.measurements.size();
+  if (!is_most && (initialiser_.isDone() || ids.size() < kFeaturesOfPose)) {
+    retire(ids, frame);
+    return false;
+  }
+  const std::string reason =
+      "features were fixed to the image, and not of the scene: started anew without them";
+  abandonMap(reason);
+  start(current.image, frame);
+  frame->reason = reason;
+  return true;
 }
 
 /// That the map may hold. What may be laid aside soon is not deleted now.
@@ -199,8 +232,6 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
                                        point.w() * T_camera_world.translation());
     if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
   }
-  const auto& fixed = initialiser_.imageFixedPixels();
-  occupied.insert(occupied.end(), fixed.begin(), fixed.end());
   const std::vector<Eigen::Vector2d> frozen = frozenPixels();
   occupied.insert(occupied.end(), frozen.begin(), frozen.end());
   const std::vector<DepthSample> known_depths = knownDepths(visible);
@@ -208,8 +239,9 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
       options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
   int started = 0;
   std::vector<FeatureMeasurement> first_sights;
+  const cv::Mat centres = image_fixed_.sceneCentres(mask_.patchCentres(), options_.image);
   for (const Corner& corner :
-       detectCorners(image, occupied, wanted, distance_px, options_.image, mask_.patchCentres())) {
+       detectCorners(image, occupied, wanted, distance_px, options_.image, centres)) {
     const auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
                                           options_.image.source_patch_size_px);
     if (!patch) continue;

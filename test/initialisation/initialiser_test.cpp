@@ -291,33 +291,6 @@ TEST(Initialiser, ForwardMotionIsFound) {
   }
 }
 
-TEST(Initialiser, PointsThatKeepTheirPixelAreDropped) {
-  // A third of the points is burnt into the images while the camera turns and moves.
-  const Bundle clean = filmOf(30, 300, 0.1, 3, [](int k, CameraState* camera) {
-    camera->q_world_camera = rotationFromVector(Eigen::Vector3d(0.001 * k, 0.006 * k, 0.0));
-    camera->position_world = 0.02 * k * Eigen::Vector3d(1.0, -0.2, 0.1);
-  });
-  Bundle film = clean;
-  Random random(3);
-  const int scene_points = static_cast<int>(clean.features.size());
-  for (int i = 0; i < 30; ++i) {
-    const Eigen::Vector2d pixel = random.pixel();
-    film.features.push_back(film.features.front());
-    for (auto& observations : film.observations)
-      observations.push_back(
-          {scene_points + i, pixel + Eigen::Vector2d(random.normal(0.05), random.normal(0.05))});
-  }
-  Start start(film);
-  const auto state = start.showUntil(29);
-  ASSERT_TRUE(state);
-  EXPECT_GT(cosineBetween(state->camera.position_world,
-                          film.cameras[start.committed().back()].position_world),
-            0.98);
-  for (const FeatureState& feature : state->features)
-    EXPECT_LT(start.featureOf(feature.id), scene_points);
-  EXPECT_GE(start.initialiser().imageFixedPixels().size(), 25u);
-}
-
 TEST(Initialiser, FarPointsThatKeepTheirPixelAreKept) {
   // Sideways without a turn: what is far keeps its pixel too, and is a point of the scene.
   Bundle film = exampleBundle(CameraModel(exampleCalibration()), 25, 80, 0.0, 0.0, 4, 0.3);

@@ -39,6 +39,7 @@ struct FrameRecord {
   double lost_bits = 0.0;
   int submaps_frozen = 0, submaps_found = 0, loops = 0, map_epoch = 0;
   double quality = 1.0;
+  double image_fixed = 0.0;  ///< share of the image
   std::string quality_reason;
   Accelerations accelerations;
   MatchStatistics matching;

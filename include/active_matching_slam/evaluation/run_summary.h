@@ -54,6 +54,7 @@ struct RunSummary {
   int main_map = 0;  ///< that of most tracked frames: errors are of the poses in it
   int frames_in_main_map = 0;
   double quality = 1.0;        ///< median over the tracked frames
+  double image_fixed = 0.0;    ///< share of the image that is no scene: the same
   std::string quality_reason;  ///< the most frequent cause of a low one
   int truth_pairs = 0;         ///< tracked frames with a true pose
   std::optional<double> ate_sim3_m, ate_se3_m, sim3_scale;

@@ -66,8 +66,6 @@ class Initialiser {
   }
   /// The second image, which was added last, has nothing to do with the first: start from it.
   bool isFirstUnrelated() const { return is_first_unrelated_; }
-  /// Pixels that belong to the image and not to the scene: burnt-in text, dirt, the robot itself.
-  const std::vector<Eigen::Vector2d>& imageFixedPixels() const { return image_fixed_px_; }
 
   /// Adds the matches of an image; `filter` is what was made of it.
   void add(const CameraModel& model, const KeyframeMeasurements& image, const Ekf& filter);
@@ -89,7 +87,6 @@ class Initialiser {
   std::optional<InitialState> refine(const CameraModel& model, const Ekf& filter);
   std::optional<InitialState> commit(const CameraModel& model, const Ekf& filter,
                                      const BundleOptions& options, MotionHypothesis adjusted);
-  void dropImageFixed(double sigma_px);
 
   InitialiserOptions options_;
   InitialiserState state_ = InitialiserState::kDone;
@@ -97,10 +94,9 @@ class Initialiser {
   std::optional<MotionHypothesis> accepted_;
   ScaleGauge scale_;
   std::vector<FeatureId> committed_;  ///< features of the last commit, ascending
-  std::vector<Eigen::Vector2d> image_fixed_px_;
-  double sigma_px_ = 0.0;       ///< of image points, by the accepted hypothesis
-  double parallax_ = 0.0;       ///< [rad], now
-  double last_parallax_ = 0.0;  ///< when last tested or adjusted
+  double sigma_px_ = 0.0;             ///< of image points, by the accepted hypothesis
+  double parallax_ = 0.0;             ///< [rad], now
+  double last_parallax_ = 0.0;        ///< when last tested or adjusted
   int images_ = 0, last_images_ = 0;
   int adjusting_images_ = 0;  ///< that the adjustment in hand has taken; 0: none is
   bool is_last_added_ = false, is_first_unrelated_ = false;

@@ -38,9 +38,6 @@ struct InitialiserOptions {
   /// Cost by image point over that expected, by the noise assumed, beyond which no candidate fits:
   /// things move, or matches lie.
   double maximum_reduced_chi2 = 2.0;
-  /// A point keeps its pixel when it moved less than the first while the median point moved more
-  /// than the second [sigma].
-  double image_fixed_sigmas = 2.0, image_moved_sigmas = 20.0;
   /// Matches of the second image, of the points of the first, below which the first has nothing to
   /// do with it.
   double unrelated_fraction = 0.5;

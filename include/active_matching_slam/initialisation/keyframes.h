@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "active_matching_slam/camera/camera_model.h"
@@ -62,14 +61,9 @@ class Keyframes {
   /// with it: the angle between rays that no rotation explains, of three quarters of the points;
   /// of noise alone it is about the noise's median. Empty when none does.
   std::optional<double> parallax(const CameraModel& model) const;
-  /// Features that keep their pixel while the median feature moves: burnt-in text, dirt, the robot
-  /// itself, or far away where nothing rotates.
-  std::set<FeatureId> keepTheirPixel(double sigma_px) const;
-
   /// Few keyframes as if the camera had only rotated; the rotations are kept. Empty when they do
   /// not hang together.
-  std::optional<MotionHypothesis> rotationOnly(const CameraModel& model,
-                                               const std::set<FeatureId>& without) const;
+  std::optional<MotionHypothesis> rotationOnly(const CameraModel& model) const;
   /// All keyframes: cameras and features of `known` where it has them, other cameras by constant
   /// velocity, other features at the median depth. Empty when they do not hang together.
   std::optional<MotionHypothesis> extend(const CameraModel& model,
@@ -79,8 +73,7 @@ class Keyframes {
   void cull(const CameraModel& model);
   void placeCameras(const CameraModel& model, const MotionHypothesis& known,
                     const std::vector<bool>& is_known, MotionHypothesis* all) const;
-  MotionHypothesis observationsOf(const CameraModel& model, const std::vector<int>& chosen,
-                                  const std::set<FeatureId>& without) const;
+  MotionHypothesis observationsOf(const CameraModel& model, const std::vector<int>& chosen) const;
   bool isConnected(const Bundle& bundle) const;
 
   InitialiserOptions options_;

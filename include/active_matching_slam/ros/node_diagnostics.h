@@ -68,6 +68,7 @@ class NodeDiagnostics {
   int candidates_ = 0, matched_ = 0, resets_ = 0, times_lost_ = 0;
   int map_ = 0;
   double quality_ = 1.0;
+  double image_fixed_ = 0.0;  ///< share of the image
   std::string quality_reason_;
   std::string matcher_;
 };

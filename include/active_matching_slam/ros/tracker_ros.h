@@ -55,6 +55,7 @@ class TrackerRos {
   void noticeChanges(const TrackedFrame& frame, const ros::Time& stamp);
   std::string noticeMotion(const TrackedFrame& frame);
   void noticeScale(const TrackedFrame& frame);
+  void noticeImageFixed(const TrackedFrame& frame);
   void forgetPast(bool time_jumped);
   std::string cameraFrame(const std_msgs::Header& header) const;
 
@@ -98,7 +99,7 @@ class TrackerRos {
   std::unique_ptr<MaskedImages> masked_images_;
   std::unique_ptr<MotionSubscription> motion_;
   bool is_motion_told_ = true;  ///< nothing was said yet of its being missing
-  OnceWarning motion_warning_, scale_warning_;
+  OnceWarning motion_warning_, scale_warning_, image_fixed_warning_;
   std::unique_ptr<CameraSubscription> subscription_;
   ros::Subscriber mask_, initial_pose_;
   std::unique_ptr<ReconfigureServer> reconfigure_;

@@ -173,8 +173,14 @@ struct TrackedFrame {
   /// ImageOptions::working_width. All pixels are of this image.
   cv::Mat image;
   cv::Mat mask;  ///< 0 where the image was not used; empty: all of it was
+  /// Share of the image that turned out to be fixed to it, and no part of the scene (text that is
+  /// burnt in, dirt, the robot itself): as if masked.
+  double image_fixed = 0.0;
   FrameTimings timings_ms;
 };
+
+/// That so much of images is no scene; empty for 0.
+std::string imageFixedMessage(double share);
 
 /// KL divergence of the tree that chow_liu matched by from the joint prediction [bit]; 0 for
 /// another matcher. O(F^3), and so no part of the frame.
