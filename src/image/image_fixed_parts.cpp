@@ -26,7 +26,7 @@ constexpr double kEpipolarSigmas = 1.96;
 constexpr std::size_t kLeastInliers = 15;
 /// Of the eigenvalues of a patch's structure tensor, from which on it is an edge. Standard: SIFT's
 /// (Lowe 2004, section 4.1), of the principal curvatures.
-constexpr float kEdgeRatio = 10.0F;
+constexpr double kEdgeRatio = 10.0;
 /// Comparisons that must agree. Derivation: repeated texture deceives one, but not at two
 /// distances.
 constexpr int kAgreeing = 2;
