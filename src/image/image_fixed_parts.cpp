@@ -28,7 +28,7 @@ constexpr int kSamplesPerImage = 12;  ///< Cost: half a millisecond each
 /// Epipolar distance of a static point, in standard deviations of the flow. Standard: chi-square
 /// with one degree of freedom, 95 % (Hartley and Zisserman 2004, table 4.2).
 constexpr double kEpipolarSigmas = 1.96;
-/// Inliers below which an essential matrix is not believed. Derivation: three times its minimum of
+/// Inliers below which an essential matrix is not taken. Derivation: three times its minimum of
 /// five, so that ten confirm it.
 constexpr std::size_t kLeastInliers = 15;
 /// Of the eigenvalues of a patch's structure tensor, from which on it is an edge. Standard: SIFT's
