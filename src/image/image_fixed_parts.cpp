@@ -3,9 +3,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <set>
 
 #include "active_matching_slam/image/corners.h"
 #include "active_matching_slam/image/feature_flow.h"
@@ -13,15 +15,20 @@
 namespace active_matching_slam {
 namespace {
 
-/// Least time between two comparisons [s]. Cost: how soon it is known; one takes half a frame.
+/// Least time between two comparisons [s]. Cost: how soon it is known; one is spread over ten
+/// images.
 constexpr double kComparisonPeriodS = 0.2;
 constexpr std::size_t kMostCorners =
-    300;                           ///< Cost: one in each 32 x 32 pixels of a 640 x 480 image
-constexpr double kSurely = 0.999;  ///< that a sample is met without outlier. Standard: OpenCV
+    300;  ///< Cost: one in each 32 x 32 pixels of a 640 x 480 image
+constexpr std::size_t kMinimalPoints = 5;  ///< Standard: of an essential matrix (Nister 2004)
+/// Samples of as many points. Derivation: where half of the matches are wrong, one is without a
+/// wrong one with 95 %: log 0.05 / log(1 - 0.5^5).
+constexpr int kSamples = 96;
+constexpr int kSamplesPerImage = 12;  ///< Cost: half a millisecond each
 /// Epipolar distance of a static point, in standard deviations of the flow. Standard: chi-square
 /// with one degree of freedom, 95 % (Hartley and Zisserman 2004, table 4.2).
 constexpr double kEpipolarSigmas = 1.96;
-/// Inliers below which an essential matrix is not believed. Derivation: three times its minimum of
+/// Inliers below which an essential matrix is not taken. Derivation: three times its minimum of
 /// five, so that ten confirm it.
 constexpr std::size_t kLeastInliers = 15;
 /// Of the eigenvalues of a patch's structure tensor, from which on it is an edge. Standard: SIFT's
@@ -92,34 +99,6 @@ double epipolarDistance(const cv::Matx33d& E, const cv::Point2d& from, const cv:
          std::sqrt(line[0] * line[0] + line[1] * line[1] + back[0] * back[0] + back[1] * back[1]);
 }
 
-/// By what most points say that were found in the second image; empty where they do not agree.
-/// `limit`: of the epipolar distance of an inlier.
-std::optional<cv::Matx33d> essentialMatrix(
-    const CameraModel& camera, const std::vector<std::optional<Eigen::Vector2d>>& from_px,
-    const std::vector<std::optional<Eigen::Vector2d>>& to_px, double limit) {
-  std::vector<cv::Point2d> from, to;
-  for (std::size_t i = 0; i < from_px.size(); ++i) {
-    if (!to_px[i]) continue;
-    const cv::Point2d a = idealOf(camera, *from_px[i]), b = idealOf(camera, *to_px[i]);
-    if (!std::isfinite(a.x) || !std::isfinite(b.x)) continue;
-    from.push_back(a);
-    to.push_back(b);
-  }
-  if (from.size() < kLeastInliers) return std::nullopt;
-  // Half of them may be wrong, and the bound of an inlier is far beyond the noise of most: the
-  // least median of squares (Rousseeuw 1984) asks for no more, and fits better than counting
-  // inliers.
-  const cv::Mat found =
-      cv::findEssentialMat(from, to, 1.0, cv::Point2d(0.0, 0.0), cv::LMEDS, kSurely, limit);
-  if (found.rows != 3) return std::nullopt;
-  const cv::Matx33d E(found.ptr<double>());
-  std::size_t inliers = 0;
-  for (std::size_t i = 0; i < from.size(); ++i)
-    if (epipolarDistance(E, from[i], to[i]) <= limit) ++inliers;
-  if (inliers < kLeastInliers || 2 * inliers < from.size()) return std::nullopt;
-  return E;
-}
-
 }  // namespace
 
 double ImageFixedParts::share() const {
@@ -147,7 +126,7 @@ cv::Mat ImageFixedParts::sceneCentres(const cv::Mat& centres, const ImageOptions
 /// Makes an image the reference.
 void ImageFixedParts::take(const cv::Mat& image, const std::vector<Eigen::Vector2d>& features,
                            const ImageOptions& options, const cv::Mat& centres) {
-  reference_ = image;
+  reference_ = image.clone();  // its memory may be used again
   corners_px_.clear();
   for (const Suspect& suspect : suspects_) corners_px_.push_back(suspect.pixel);
   for (const Eigen::Vector2d& pixel : features) corners_px_.emplace_back(pixel.array().round());
@@ -163,62 +142,129 @@ void ImageFixedParts::take(const cv::Mat& image, const std::vector<Eigen::Vector
 bool ImageFixedParts::add(const CameraModel& camera, const cv::Mat& image, double stamp_s,
                           const std::vector<Eigen::Vector2d>& features, const ImageOptions& options,
                           const cv::Mat& centres) {
-  if (reference_.empty() || reference_.size() != image.size()) {
-    last_stamp_s_ = stamp_s;
-    take(image, features, options, centres);
-    return false;
+  if (reference_.size() != image.size()) step_ = Step::kTake;
+  switch (step_) {
+    case Step::kTake:
+      last_stamp_s_ = stamp_s;
+      take(image, features, options, centres);
+      step_ = Step::kCompare;
+      break;
+    case Step::kCompare:
+      if (stamp_s - last_stamp_s_ < kComparisonPeriodS) break;
+      last_stamp_s_ = stamp_s;
+      if (compare(image, options)) step_ = Step::kTrack;
+      break;
+    case Step::kTrack:
+      track(camera);
+      step_ = Step::kFit;
+      break;
+    case Step::kFit:
+      fitMotion(kSamplesPerImage);
+      if (samples_ < kSamples) break;
+      judge(camera, options);
+      step_ = Step::kTake;
+      return true;
   }
-  if (stamp_s - last_stamp_s_ < kComparisonPeriodS) return false;
-  last_stamp_s_ = stamp_s;
-  const std::size_t n = corners_px_.size();
-  std::vector<bool> is_moved(n), is_fixed(n, false);
-  const cv::Mat stays = whatStays(reference_, image, options);
-  for (std::size_t i = 0; i < n; ++i)
-    is_moved[i] = stays.at<uchar>(static_cast<int>(corners_px_[i].y()),
-                                  static_cast<int>(corners_px_[i].x())) == 0;
-  const auto spread = is_moved.begin() + static_cast<std::ptrdiff_t>(first_spread_);
-  if (std::count(spread, is_moved.end(), true) <= std::count(spread, is_moved.end(), false))
-    return false;
+  return false;
+}
 
-  std::vector<std::optional<Eigen::Vector2d>> moved_px(n);
-  for (std::size_t i = 0; i < n; ++i)
-    if (is_moved[i]) moved_px[i] = corners_px_[i];
-  const double limit = kEpipolarSigmas * flowSigma_px(image.cols) / camera.calibration().fx;
-  const auto E = essentialMatrix(camera, moved_px, trackPoints(reference_, image, moved_px), limit);
-  for (std::size_t i = 0; E && i < n; ++i) {
-    if (is_moved[i] || !isBestWhereItWas(reference_, image, corners_px_[i], options)) continue;
-    const cv::Point2d ideal = idealOf(camera, corners_px_[i]);
-    is_fixed[i] = epipolarDistance(*E, ideal, ideal) > limit;
+/// Whether most of the picture has moved since the reference.
+bool ImageFixedParts::compare(const cv::Mat& image, const ImageOptions& options) {
+  second_ = image.clone();
+  stays_ = whatStays(reference_, second_, options);
+  std::ptrdiff_t moved = 0, all = 0;
+  for (std::size_t i = first_spread_; i < corners_px_.size(); ++i, ++all) moved += isMoved(i);
+  return 2 * moved > all;
+}
+
+bool ImageFixedParts::isMoved(std::size_t corner) const {
+  return stays_.at<uchar>(static_cast<int>(corners_px_[corner].y()),
+                          static_cast<int>(corners_px_[corner].x())) == 0;
+}
+
+/// Where the corners that moved have gone to.
+void ImageFixedParts::track(const CameraModel& camera) {
+  std::vector<std::optional<Eigen::Vector2d>> moved_px(corners_px_.size());
+  for (std::size_t i = 0; i < corners_px_.size(); ++i)
+    if (isMoved(i)) moved_px[i] = corners_px_[i];
+  const auto to_px = trackPoints(reference_, second_, moved_px);
+  from_.clear();
+  to_.clear();
+  for (std::size_t i = 0; i < corners_px_.size(); ++i) {
+    if (!to_px[i]) continue;
+    const cv::Point2d a = idealOf(camera, *moved_px[i]), b = idealOf(camera, *to_px[i]);
+    if (!std::isfinite(a.x) || !std::isfinite(b.x)) continue;
+    from_.push_back(a);
+    to_.push_back(b);
   }
-  judge(is_moved, is_fixed, options);
-  grow(stays);
-  take(image, features, options, centres);
-  return true;
+  samples_ = 0;
+  random_ = cv::RNG();
+  least_median_ = std::numeric_limits<double>::infinity();
+}
+
+/// Essential matrices of five points each; that is kept by which half of the points err least.
+void ImageFixedParts::fitMotion(int samples) {
+  samples_ += samples;
+  if (from_.size() < kLeastInliers) return;
+  std::vector<double> distances(from_.size());
+  for (int k = 0; k < samples; ++k) {
+    std::set<int> chosen;
+    while (chosen.size() < kMinimalPoints)
+      chosen.insert(random_.uniform(0, static_cast<int>(from_.size())));
+    std::vector<cv::Point2d> from, to;
+    for (const int i : chosen) {
+      from.push_back(from_[static_cast<std::size_t>(i)]);
+      to.push_back(to_[static_cast<std::size_t>(i)]);
+    }
+    const cv::Mat found = cv::findEssentialMat(from, to);  // all that fit, one below the other
+    for (int row = 0; row + 3 <= found.rows; row += 3) {
+      const cv::Matx33d E(found.ptr<double>(row));
+      for (std::size_t i = 0; i < from_.size(); ++i)
+        distances[i] = epipolarDistance(E, from_[i], to_[i]);
+      const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+      std::nth_element(distances.begin(), median, distances.end());
+      if (!(*median < least_median_)) continue;
+      least_median_ = *median;
+      E_ = E;
+    }
+  }
 }
 
 /// Adds to the record of each suspect what became of it, and new ones.
-void ImageFixedParts::judge(const std::vector<bool>& is_moved, const std::vector<bool>& is_fixed,
-                            const ImageOptions& options) {
+void ImageFixedParts::judge(const CameraModel& camera, const ImageOptions& options) {
+  const double limit = kEpipolarSigmas * flowSigma_px(second_.cols) / camera.calibration().fx;
+  std::size_t inliers = 0;
+  for (std::size_t i = 0; i < from_.size(); ++i)
+    inliers += epipolarDistance(E_, from_[i], to_[i]) <= limit;
+  const bool is_known = inliers >= kLeastInliers && 2 * inliers >= from_.size();
+  const auto isFixed = [&](std::size_t i) {
+    if (!is_known || isMoved(i) || !isBestWhereItWas(reference_, second_, corners_px_[i], options))
+      return false;
+    const cv::Point2d ideal = idealOf(camera, corners_px_[i]);
+    return epipolarDistance(E_, ideal, ideal) > limit;
+  };
   const std::size_t known = suspects_.size();  // the first of the corners
   for (std::size_t i = 0; i < corners_px_.size(); ++i) {
     if (i < known) {
-      suspects_[i].fixed += is_fixed[i];
-      suspects_[i].moved += is_moved[i];
+      suspects_[i].fixed += isFixed(i);
+      suspects_[i].moved += isMoved(i);
       continue;
     }
     const bool is_near = std::any_of(suspects_.begin(), suspects_.end(), [&](const Suspect& s) {
       return (s.pixel - corners_px_[i]).cwiseAbs().maxCoeff() <= 0.5 * options.template_size_px;
     });
-    if (is_fixed[i] && !is_near) suspects_.push_back({corners_px_[i]});
+    if (!is_near && isFixed(i)) suspects_.push_back({corners_px_[i]});
   }
   suspects_.erase(std::remove_if(suspects_.begin(), suspects_.end(),
                                  [](const Suspect& s) { return s.moved >= s.fixed; }),
                   suspects_.end());
+  grow();
 }
 
 /// The parts that stayed around an agreed suspect, and no farther from it than the next corner
 /// would be: where little has moved yet, some of the scene hangs together with it.
-void ImageFixedParts::grow(const cv::Mat& stays) {
+void ImageFixedParts::grow() {
+  const cv::Mat& stays = stays_;
   fixed_.release();
   std::vector<cv::Point> seeds;
   for (const Suspect& suspect : suspects_)

@@ -86,7 +86,10 @@ bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame
   }
   const CameraModel calibrated = camera_.corrected({});
   initialiser_.add(calibrated, {frame->index, last_stamp_s_, current.measurements}, filter_);
-  if (initialiser_.isFirstUnrelated()) {
+  // Of features that were not looked for nothing is known.
+  const bool is_looked_for = !current.matching.statistics.cut_short &&
+                             2 * current.measurements.size() < current.prior.ids.size();
+  if (initialiser_.isFirstUnrelated() && is_looked_for) {
     start(current.image, frame);
     ++resets_;
     ++jumps_;

@@ -48,6 +48,12 @@ const cv::Mat& theWall() {
   return wall;
 }
 
+/// An image for half a second, in which a comparison with the one before comes to its end.
+void show(const cv::Mat& image, int k, ImageFixedParts* parts) {
+  for (int i = 0; i < 25; ++i)
+    parts->add(straightCamera(), image, 0.5 * k + 0.02 * i, {}, ImageOptions());
+}
+
 /// Some seconds of images, `change` applied to each.
 template <class View, class Change>
 ImageFixedParts watch(const View& view, const Change& change) {
@@ -55,7 +61,7 @@ ImageFixedParts watch(const View& view, const Change& change) {
   for (int k = 0; k < 12; ++k) {
     cv::Mat image = view(k);
     change(k, &image);
-    parts.add(straightCamera(), image, 0.3 * k, {}, ImageOptions());
+    show(image, k, &parts);
   }
   return parts;
 }
@@ -91,17 +97,16 @@ TEST(ImageFixedParts, AsSoonAsItHasMovedAndNoLongerOnceItIsGone) {
   const cv::Mat gripper = speckles(place.size(), 2.0, 2);
   ImageFixedParts parts;
   const ImageOptions options;
-  const CameraModel camera = straightCamera();
   for (int k = 0; k < 6; ++k) {
     cv::Mat image = handHeld(k);
     gripper.copyTo(image(place));
-    parts.add(camera, image, 0.3 * k, {}, options);
+    show(image, k, &parts);
   }
   EXPECT_TRUE(parts.contains({160.0, 160.0}));
   EXPECT_FALSE(parts.contains({400.0, 300.0}));
   EXPECT_EQ(parts.sceneCentres(cv::Mat(), options).at<uchar>(160, 160), 0);
   EXPECT_EQ(parts.sceneCentres(cv::Mat(), options).at<uchar>(300, 400), 255);
-  for (int k = 6; k < 16; ++k) parts.add(camera, handHeld(k), 0.3 * k, {}, options);
+  for (int k = 6; k < 16; ++k) show(handHeld(k), k, &parts);
   EXPECT_FALSE(parts.contains({160.0, 160.0}));
 }
 

@@ -52,7 +52,7 @@ TEST(FeatureChoice, MeasuresThoseThatTellMoreThanMostOfTheVisible) {
 TEST(FeatureChoice, StopsWhereTheNextWouldTellTooLittle) {
   TrackerOptions options = choiceOptions(true, 60);
   const Frames all = trackChoosing(options);
-  options.matching.stop_bits = 0.5;
+  options.matching.stop_bits = 0.2;
   const Frames some = trackChoosing(options);
   options.matching.stop_bits = 100.0;  // more than any feature tells
   const Frames fewest = trackChoosing(options);
@@ -63,7 +63,7 @@ TEST(FeatureChoice, StopsWhereTheNextWouldTellTooLittle) {
     measured[2] += fewest[i]->prior.size();
     EXPECT_EQ(fewest[i]->state, TrackingState::kTracking);
     EXPECT_GE(fewest[i]->matching.statistics.matched, 8) << "enough for a consensus, frame " << i;
-    EXPECT_LT(some[i]->state_bits_left, 0.5);
+    EXPECT_LT(some[i]->state_bits_left, 0.2);
   }
   EXPECT_LT(measured[1], measured[0]);
   EXPECT_LT(measured[2], measured[1]);

@@ -22,7 +22,8 @@ class ImageFixedParts {
 
   /// An image (8-bit grey) at `stamp_s`; `features`: where those of the map are in it, so that they
   /// are judged as well as other corners. `centres`: pixels that may be looked at (CV_8U; empty:
-  /// all). True when images were compared: what is fixed may be another.
+  /// all). True when a comparison has ended: what is
+  /// fixed may be another.
   bool add(const CameraModel& camera, const cv::Mat& image, double stamp_s,
            const std::vector<Eigen::Vector2d>& features, const ImageOptions& options,
            const cv::Mat& centres = cv::Mat());
@@ -40,18 +41,30 @@ class ImageFixedParts {
     Eigen::Vector2d pixel;
     int fixed = 1, moved = 0;  ///< comparisons in which it was so
   };
+  /// Of a comparison: one is taken with each image, so that no image takes long.
+  enum class Step { kTake, kCompare, kTrack, kFit };
+
   void take(const cv::Mat& image, const std::vector<Eigen::Vector2d>& features,
             const ImageOptions& options, const cv::Mat& centres);
-  void judge(const std::vector<bool>& is_moved, const std::vector<bool>& is_fixed,
-             const ImageOptions& options);
+  bool compare(const cv::Mat& image, const ImageOptions& options);
+  bool isMoved(std::size_t corner) const;
+  void track(const CameraModel& camera);
+  void fitMotion(int samples);
+  void judge(const CameraModel& camera, const ImageOptions& options);
+  void grow();
 
-  void grow(const cv::Mat& stays);
-
-  cv::Mat reference_;
-  /// In it, whole numbers: the suspects, features, and corners all over the image.
+  Step step_ = Step::kTake;
+  double last_stamp_s_ = 0.0;   ///< of the reference, or of the last image compared with it
+  cv::Mat reference_, second_;  ///< the images compared
+  /// In the reference, whole numbers: the suspects, features, and corners all over the image.
   std::vector<Eigen::Vector2d> corners_px_;
   std::size_t first_spread_ = 0;  ///< of those all over: they say what most of the picture does
-  double last_stamp_s_ = 0.0;     ///< of the last comparison, or the reference
+  cv::Mat stays_;                 ///< 255 where both images look the same
+  std::vector<cv::Point2d> from_, to_;  ///< what moved, normalised
+  int samples_ = 0;
+  cv::RNG random_;
+  double least_median_ = 0.0;  ///< of the epipolar distances by
+  cv::Matx33d E_;              ///< the best essential matrix so far
   std::vector<Suspect> suspects_;
   cv::Mat fixed_;
 };
