@@ -28,14 +28,13 @@ void Initialiser::begin(KeyframeMeasurements first) {
 }
 
 void Initialiser::add(const CameraModel& model, const KeyframeMeasurements& image,
-                      const Ekf& filter) {
+                      const Ekf& filter, int looked_for) {
   if (isDone()) return;
   ++images_;
   const double shared = static_cast<double>(image.measurements.size());
-  is_first_unrelated_ =
-      images_ == 1 &&
-      shared < options_.unrelated_fraction *
-                   static_cast<double>(keyframes_.all().front().measurements.size());
+  const double first = static_cast<double>(keyframes_.all().front().measurements.size());
+  is_first_unrelated_ = images_ == 1 && looked_for > options_.unrelated_fraction * first &&
+                        shared < options_.unrelated_fraction * looked_for;
   is_last_added_ = keyframes_.add(model, image, filter.camera().poseWorldCamera());
 }
 

@@ -252,13 +252,10 @@ double MatchCascade::expectedOfResult(const FrameState& frame) const {
   const MatchStatistics& statistics = frame.matching.statistics;
   if (!statistics.cut_short) return expectedMatches(frame);
   double expected = 0.0;
-  int searched = 0;
-  for (int i = 0; i < frame.prior.size(); ++i) {
-    if (frame.search.searchedPixels(i).size() == 0) continue;
-    expected += frame.match_probabilities[i];
-    ++searched;
-  }
-  const bool is_crowded = statistics.matches_met > options_.crowded_matches * searched;
+  for (int i = 0; i < frame.prior.size(); ++i)
+    if (frame.isLookedFor(i)) expected += frame.match_probabilities[i];
+  const bool is_crowded =
+      statistics.matches_met > options_.crowded_matches * frame.countLookedFor();
   return is_crowded ? expectedMatches(frame) : expected;
 }
 

@@ -85,11 +85,9 @@ bool Tracker::Implementation::initialise(const FrameState& current, TrackedFrame
     return false;
   }
   const CameraModel calibrated = camera_.corrected({});
-  initialiser_.add(calibrated, {frame->index, last_stamp_s_, current.measurements}, filter_);
-  // Of features that were not looked for nothing is known.
-  const bool is_looked_for = !current.matching.statistics.cut_short &&
-                             2 * current.measurements.size() < current.prior.ids.size();
-  if (initialiser_.isFirstUnrelated() && is_looked_for) {
+  initialiser_.add(calibrated, {frame->index, last_stamp_s_, current.measurements}, filter_,
+                   current.countLookedFor());
+  if (initialiser_.isFirstUnrelated()) {
     start(current.image, frame);
     ++resets_;
     ++jumps_;

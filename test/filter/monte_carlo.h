@@ -130,7 +130,8 @@ class Simulation {
   }
 
   void initialise(const std::vector<FeatureMeasurement>& measurements) {
-    initialiser_.add(model_, {++frame_, frame_ / options_.rate_hz, measurements}, filter_);
+    initialiser_.add(model_, {++frame_, frame_ / options_.rate_hz, measurements}, filter_,
+                     static_cast<int>(filter_.features().size()));
     if (const auto state = initialiser_.step(model_, filter_))
       filter_.restore(state->camera, state->features, state->covariance, filter_.nextId());
   }

@@ -45,7 +45,8 @@ class Start {
     }
     std::sort(measurements.begin(), measurements.end(),
               [](const auto& a, const auto& b) { return a.id < b.id; });
-    initialiser_.add(model_, {shown_, shown_ * kIntervalS, measurements}, filter_);
+    initialiser_.add(model_, {shown_, shown_ * kIntervalS, measurements}, filter_,
+                     looked_for_.value_or(static_cast<int>(filter_.features().size())));
     const auto state = initialiser_.step(model_, filter_);
     if (state) filter_.restore(state->camera, state->features, state->covariance, filter_.nextId());
     if (starts_features_) initialiser_.addFirstSights(firstSights(shown_));
@@ -64,6 +65,8 @@ class Start {
     return last;
   }
 
+  /// How many features an image is searched for; without, all of them.
+  void lookFor(int features) { looked_for_ = features; }
   /// From now on what comes into sight is added to the map, and what went is removed.
   void startFeatures() { starts_features_ = true; }
 
@@ -104,6 +107,7 @@ class Start {
   std::vector<int> committed_;
   bool starts_features_ = false;
   int shown_ = 0;
+  std::optional<int> looked_for_;
 };
 
 Bundle track(int images, double step_m, unsigned seed, double sigma_px = 0.2) {
@@ -328,6 +332,16 @@ TEST(Initialiser, AFirstImageThatHasNothingToDoWithTheSecondIsSaidToBe) {
   Start start(film);
   start.showUntil(1);
   EXPECT_TRUE(start.initialiser().isFirstUnrelated());
+}
+
+TEST(Initialiser, OfFeaturesThatWereNotLookedForNothingIsKnown) {
+  Bundle film = track(12, 0.02, 5);
+  const std::size_t quarter = film.observations[1].size() / 4;
+  film.observations[1].resize(quarter);
+  Start start(film);
+  start.lookFor(static_cast<int>(quarter));  // and found
+  start.showUntil(11);
+  EXPECT_FALSE(start.initialiser().isFirstUnrelated());
 }
 
 TEST(Initialiser, ImagesThatShowLittleInBetweenAreLeftOut) {

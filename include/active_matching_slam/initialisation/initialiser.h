@@ -67,8 +67,10 @@ class Initialiser {
   /// The second image, which was added last, has nothing to do with the first: start from it.
   bool isFirstUnrelated() const { return is_first_unrelated_; }
 
-  /// Adds the matches of an image; `filter` is what was made of it.
-  void add(const CameraModel& model, const KeyframeMeasurements& image, const Ekf& filter);
+  /// Adds the matches of an image; `filter` is what was made of it. `looked_for`: how many features
+  /// were searched for in it, matched or not.
+  void add(const CameraModel& model, const KeyframeMeasurements& image, const Ekf& filter,
+           int looked_for);
   /// Joins to the last image features that it showed first, numbered above all before.
   void addFirstSights(const std::vector<FeatureMeasurement>& measurements);
   /// Takes all lengths times `factor`, as the filter does when its scale becomes known.

@@ -38,8 +38,8 @@ struct InitialiserOptions {
   /// Cost by image point over that expected, by the noise assumed, beyond which no candidate fits:
   /// things move, or matches lie.
   double maximum_reduced_chi2 = 2.0;
-  /// Matches of the second image, of the points of the first, below which the first has nothing to
-  /// do with it.
+  /// Matches of the second image, of the first one's points that were looked for in it, below which
+  /// the first has nothing to do with it; of points looked for, below which that is not known.
   double unrelated_fraction = 0.5;
   /// Cost: Levenberg-Marquardt iterations an image, times keyframes, and images that one adjustment
   /// may take.

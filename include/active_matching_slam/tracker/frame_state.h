@@ -61,6 +61,13 @@ struct FrameState {
 
   // From the update.
   std::vector<FeatureMeasurement> measurements;  ///< those of the inliers, as fused
+
+  bool isLookedFor(int entry) const { return search.searchedPixels(entry).size() > 0; }
+  int countLookedFor() const {
+    int count = 0;
+    for (int i = 0; i < prior.size(); ++i) count += isLookedFor(i);
+    return count;
+  }
 };
 
 }  // namespace active_matching_slam
