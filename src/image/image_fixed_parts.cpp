@@ -18,8 +18,8 @@ namespace {
 /// Least time between two comparisons [s]. Cost: how soon it is known; one is spread over ten
 /// images.
 constexpr double kComparisonPeriodS = 0.2;
-constexpr std::size_t kMostCorners =
-    300;  ///< Cost: one in each 32 x 32 pixels of a 640 x 480 image
+/// Cost: one in each 32 x 32 pixels of a 640 x 480 image.
+constexpr std::size_t kMostCorners = 300;
 constexpr std::size_t kMinimalPoints = 5;  ///< Standard: of an essential matrix (Nister 2004)
 /// Samples of as many points. Derivation: where half of the matches are wrong, one is without a
 /// wrong one with 95 %: log 0.05 / log(1 - 0.5^5).
@@ -59,14 +59,18 @@ cv::Mat whatStays(const cv::Mat& first, const cv::Mat& second, const ImageOption
          (covariance.mul(covariance) >= score * score * variance_a.mul(variance_b));
 }
 
+/// Of a patch around a whole pixel.
+cv::Rect windowAround(const Eigen::Vector2d& pixel, int size) {
+  return {static_cast<int>(pixel.x()) - size / 2, static_cast<int>(pixel.y()) - size / 2, size,
+          size};
+}
+
 /// Whether a patch is found at its own pixel rather than beside it: one that is not sharp looks the
 /// same a pixel away.
 bool isBestWhereItWas(const cv::Mat& first, const cv::Mat& second, const Eigen::Vector2d& pixel,
                       const ImageOptions& options) {
   const int size = options.template_size_px;
-  const cv::Rect window(static_cast<int>(pixel.x()) - size / 2,
-                        static_cast<int>(pixel.y()) - size / 2, size, size);
-  const cv::Rect around(window.x - 1, window.y - 1, size + 2, size + 2);
+  const cv::Rect window = windowAround(pixel, size), around = windowAround(pixel, size + 2);
   if ((around & cv::Rect({}, first.size())) != around) return false;
   cv::Mat scores;
   cv::matchTemplate(second(around), first(window), scores, cv::TM_CCOEFF_NORMED);
@@ -78,9 +82,7 @@ bool isBestWhereItWas(const cv::Mat& first, const cv::Mat& second, const Eigen::
 /// Whether a patch, which lies in the image, looks the same when it moves along some line.
 bool isEdge(const cv::Mat& image, const Eigen::Vector2d& pixel, int size) {
   cv::Mat eigen;
-  const cv::Rect window(static_cast<int>(pixel.x()) - size / 2,
-                        static_cast<int>(pixel.y()) - size / 2, size, size);
-  cv::cornerEigenValsAndVecs(image(window), eigen, size, 3);
+  cv::cornerEigenValsAndVecs(image(windowAround(pixel, size)), eigen, size, 3);
   const auto& middle = eigen.at<cv::Vec6f>(size / 2, size / 2);
   return middle[1] * kEdgeRatio < middle[0];
 }
@@ -101,26 +103,16 @@ double epipolarDistance(const cv::Matx33d& E, const cv::Point2d& from, const cv:
 
 }  // namespace
 
-double ImageFixedParts::share() const {
-  return fixed_.empty()
-             ? 0.0
-             : static_cast<double>(cv::countNonZero(fixed_)) / static_cast<double>(fixed_.total());
-}
-
 bool ImageFixedParts::contains(const Eigen::Vector2d& pixel) const {
   const cv::Point place(static_cast<int>(std::lround(pixel.x())),
                         static_cast<int>(std::lround(pixel.y())));
   return cv::Rect({}, fixed_.size()).contains(place) && fixed_.at<uchar>(place) != 0;
 }
 
-cv::Mat ImageFixedParts::sceneCentres(const cv::Mat& centres, const ImageOptions& options) const {
-  if (fixed_.empty()) return centres;
-  cv::Mat touching, scene;
-  cv::dilate(fixed_, touching,
-             cv::Mat::ones(options.template_size_px, options.template_size_px, CV_8U));
-  cv::bitwise_not(touching, scene);
-  if (!centres.empty()) cv::bitwise_and(scene, centres, scene);
-  return scene;
+cv::Mat ImageFixedParts::sceneCentres(const cv::Mat& centres) const {
+  if (scene_centres_.empty()) return centres;
+  if (centres.empty()) return scene_centres_;
+  return scene_centres_ & centres;
 }
 
 /// Makes an image the reference.
@@ -258,33 +250,38 @@ void ImageFixedParts::judge(const CameraModel& camera, const ImageOptions& optio
   suspects_.erase(std::remove_if(suspects_.begin(), suspects_.end(),
                                  [](const Suspect& s) { return s.moved >= s.fixed; }),
                   suspects_.end());
-  grow();
+  grow(options.template_size_px);
 }
 
 /// The parts that stayed around an agreed suspect, and no farther from it than the next corner
 /// would be: where little has moved yet, some of the scene hangs together with it.
-void ImageFixedParts::grow() {
-  const cv::Mat& stays = stays_;
+void ImageFixedParts::grow(int template_size_px) {
   fixed_.release();
+  scene_centres_.release();
+  share_ = 0.0;
   std::vector<cv::Point> seeds;
   for (const Suspect& suspect : suspects_)
     if (suspect.fixed >= kAgreeing)
       seeds.emplace_back(static_cast<int>(suspect.pixel.x()), static_cast<int>(suspect.pixel.y()));
   if (seeds.empty()) return;
-  const int reach_px = static_cast<int>(std::lround(std::sqrt(stays.total() / kMostCorners)));
-  cv::Mat near = cv::Mat::zeros(stays.size(), CV_8U), part;
+  const int reach_px = static_cast<int>(std::lround(std::sqrt(stays_.total() / kMostCorners)));
+  cv::Mat near = cv::Mat::zeros(stays_.size(), CV_8U), part;
   for (const cv::Point& seed : seeds)
     cv::rectangle(near, seed - cv::Point(reach_px, reach_px), seed + cv::Point(reach_px, reach_px),
                   255, cv::FILLED);
-  const int parts = cv::connectedComponents(stays, part);
+  const int parts = cv::connectedComponents(stays_, part);
   std::vector<uchar> is_fixed(static_cast<std::size_t>(parts), 0);
   for (const cv::Point& seed : seeds) is_fixed[static_cast<std::size_t>(part.at<int>(seed))] = 255;
   is_fixed[0] = 0;  // what does not stay
-  fixed_.create(stays.size(), CV_8U);
-  for (int v = 0; v < stays.rows; ++v)
-    for (int u = 0; u < stays.cols; ++u)
+  fixed_.create(stays_.size(), CV_8U);
+  for (int v = 0; v < stays_.rows; ++v)
+    for (int u = 0; u < stays_.cols; ++u)
       fixed_.at<uchar>(v, u) = is_fixed[static_cast<std::size_t>(part.at<int>(v, u))];
   cv::bitwise_and(fixed_, near, fixed_);
+  share_ = static_cast<double>(cv::countNonZero(fixed_)) / static_cast<double>(fixed_.total());
+  cv::Mat touching;
+  cv::dilate(fixed_, touching, cv::Mat::ones(template_size_px, template_size_px, CV_8U));
+  cv::bitwise_not(touching, scene_centres_);
 }
 
 }  // namespace active_matching_slam

@@ -45,6 +45,7 @@ void Tracker::Implementation::setMask(const cv::Mat& used) {
 }
 
 void Tracker::Implementation::reset(const std::string& reason) {
+  image_fixed_.reset();  // the time may be another
   is_pose_given_ = false;
   if (!options_.mapping && map_.size() > 0) {
     lookForCamera(reason);

@@ -96,7 +96,6 @@ TEST(ImageFixedParts, AsSoonAsItHasMovedAndNoLongerOnceItIsGone) {
   const cv::Rect place(100, 100, 120, 120);
   const cv::Mat gripper = speckles(place.size(), 2.0, 2);
   ImageFixedParts parts;
-  const ImageOptions options;
   for (int k = 0; k < 6; ++k) {
     cv::Mat image = handHeld(k);
     gripper.copyTo(image(place));
@@ -104,10 +103,26 @@ TEST(ImageFixedParts, AsSoonAsItHasMovedAndNoLongerOnceItIsGone) {
   }
   EXPECT_TRUE(parts.contains({160.0, 160.0}));
   EXPECT_FALSE(parts.contains({400.0, 300.0}));
-  EXPECT_EQ(parts.sceneCentres(cv::Mat(), options).at<uchar>(160, 160), 0);
-  EXPECT_EQ(parts.sceneCentres(cv::Mat(), options).at<uchar>(300, 400), 255);
+  EXPECT_EQ(parts.sceneCentres(cv::Mat()).at<uchar>(160, 160), 0);
+  EXPECT_EQ(parts.sceneCentres(cv::Mat()).at<uchar>(300, 400), 255);
   for (int k = 6; k < 16; ++k) show(handHeld(k), k, &parts);
   EXPECT_FALSE(parts.contains({160.0, 160.0}));
+}
+
+TEST(ImageFixedParts, ATimeThatRunsBackIsFollowedAfterAReset) {
+  const cv::Rect place(100, 100, 120, 120);
+  const cv::Mat gripper = speckles(place.size(), 2.0, 2);
+  ImageFixedParts parts;
+  for (const int first : {1000, 0}) {
+    parts.reset();
+    EXPECT_EQ(parts.share(), 0.0);
+    for (int k = 0; k < 6; ++k) {
+      cv::Mat image = handHeld(k);
+      gripper.copyTo(image(place));
+      show(image, first + k, &parts);
+    }
+    EXPECT_TRUE(parts.contains({160.0, 160.0})) << first;
+  }
 }
 
 TEST(ImageFixedParts, NothingIsJudgedByACameraAtRest) {

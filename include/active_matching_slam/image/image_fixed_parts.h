@@ -22,18 +22,17 @@ class ImageFixedParts {
 
   /// An image (8-bit grey) at `stamp_s`; `features`: where those of the map are in it, so that they
   /// are judged as well as other corners. `centres`: pixels that may be looked at (CV_8U; empty:
-  /// all). True when a comparison has ended: what is
-  /// fixed may be another.
+  /// all). True when a comparison has ended: what is fixed may be another.
   bool add(const CameraModel& camera, const cv::Mat& image, double stamp_s,
            const std::vector<Eigen::Vector2d>& features, const ImageOptions& options,
            const cv::Mat& centres = cv::Mat());
 
-  double share() const;  ///< of the image's pixels
+  double share() const { return share_; }  ///< of the image's pixels
   /// CV_8U of the image's size, 255: fixed to the image, 0: not known to be; empty: nothing is.
   const cv::Mat& fixed() const { return fixed_; }
   bool contains(const Eigen::Vector2d& pixel) const;
   /// Of `centres`, those around which a template shows nothing that is fixed.
-  cv::Mat sceneCentres(const cv::Mat& centres, const ImageOptions& options) const;
+  cv::Mat sceneCentres(const cv::Mat& centres) const;
 
  private:
   /// A corner that was found fixed once at least.
@@ -51,7 +50,7 @@ class ImageFixedParts {
   void track(const CameraModel& camera);
   void fitMotion(int samples);
   void judge(const CameraModel& camera, const ImageOptions& options);
-  void grow();
+  void grow(int template_size_px);
 
   Step step_ = Step::kTake;
   double last_stamp_s_ = 0.0;   ///< of the reference, or of the last image compared with it
@@ -63,10 +62,11 @@ class ImageFixedParts {
   std::vector<cv::Point2d> from_, to_;  ///< what moved, normalised
   int samples_ = 0;
   cv::RNG random_;
-  double least_median_ = 0.0;  ///< of the epipolar distances by
-  cv::Matx33d E_;              ///< the best essential matrix so far
+  double least_median_ = 0.0;  ///< of the epipolar distances by the best essential matrix so far
+  cv::Matx33d E_;              ///< that one
   std::vector<Suspect> suspects_;
-  cv::Mat fixed_;
+  cv::Mat fixed_, scene_centres_;
+  double share_ = 0.0;
 };
 
 }  // namespace active_matching_slam
