@@ -9,12 +9,10 @@
 #include "active_matching_slam/math/chi_square.h"
 #include "active_matching_slam/math/rotation.h"
 #include "active_matching_slam/submaps/ekf_active_map.h"
+#include "found_pose.h"
 
 namespace active_matching_slam {
 namespace {
-
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 /// Of a camera's offset. Cost: of one right loop in ten thousand a second look is taken.
 constexpr double kExpectedProbability = 0.9999;
@@ -26,9 +24,6 @@ constexpr double kPossibleInflation = 5.0;
 constexpr int kPoseFreedoms = 6;
 /// Images that a look counts for. Cost: a mistake has so long to be made twice.
 constexpr std::int64_t kLookMemoryImages = 100;
-/// Noise of a landmark's match per axis [px] at least. Derivation: that of matches to a pixel, of
-/// templates that were taken long ago.
-constexpr double kLeastSigmaPx = 1.0;
 
 Vector6 poseDifference(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
   Vector6 difference;
@@ -37,33 +32,18 @@ Vector6 poseDifference(const Eigen::Isometry3d& from, const Eigen::Isometry3d& t
   return difference;
 }
 
-double squaredDistance(const Vector6& difference, const Matrix6& covariance) {
-  const Eigen::LLT<Matrix6> factor(covariance);
-  if (factor.info() != Eigen::Success || !difference.allFinite())
-    return std::numeric_limits<double>::infinity();
-  return difference.dot(factor.solve(difference));
-}
-
-/// Of a camera found by its landmarks, by the noise of their pixels.
+/// Of a camera found by its landmarks, as errors in the world.
 Matrix6 foundCovariance(const CameraModel& camera, const PointInsertion& points,
                         const Relocalisation& found) {
-  Matrix6 information = Matrix6::Zero();
-  const Eigen::Matrix3d R_camera_world = found.T_world_camera.linear().transpose();
-  for (const FeatureMeasurement& inlier : found.inliers) {
-    for (const FeatureState& feature : points.features) {
-      if (feature.id != inlier.id) continue;
-      const Eigen::Vector3d ray = feature.point_world - found.T_world_camera.translation();
-      Eigen::Matrix<double, 2, 3> d_pixel;
-      if (!camera.project(R_camera_world * ray, &d_pixel)) continue;
-      Eigen::Matrix<double, 2, 6> J;
-      J << -d_pixel * R_camera_world, d_pixel * R_camera_world * skew(ray);
-      information += J.transpose() * J;
-    }
-  }
-  // Residuals along both axes, of which six were used up.
-  const double sigma_px = std::max(found.rms_px / std::sqrt(2.0), kLeastSigmaPx);
-  const Eigen::LDLT<Matrix6> factor(information);
-  return sigma_px * sigma_px * factor.solve(Matrix6::Identity());
+  std::vector<Eigen::Vector3d> seen;
+  for (const FeatureMeasurement& inlier : found.inliers)
+    for (const FeatureState& feature : points.features)
+      if (feature.id == inlier.id) seen.push_back(feature.point_world);
+  Matrix6 world_from_camera = Matrix6::Zero();
+  world_from_camera.topLeftCorner<3, 3>() = found.T_world_camera.linear();
+  world_from_camera.bottomRightCorner<3, 3>() = found.T_world_camera.linear();
+  return world_from_camera * foundPoseCovariance(camera, found, seen) *
+         world_from_camera.transpose();
 }
 
 /// Of points about a centre, to their motion as a body: translation of the centre and rotation, 6 x

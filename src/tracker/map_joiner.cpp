@@ -1,14 +1,14 @@
 #include "map_joiner.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "active_matching_slam/math/chi_square.h"
 #include "active_matching_slam/math/pixel_scale.h"
 #include "active_matching_slam/math/quantile.h"
 #include "active_matching_slam/math/rotation.h"
+#include "found_pose.h"
+#include "known_depth.h"
 
 namespace active_matching_slam {
 namespace {
@@ -16,17 +16,9 @@ namespace {
 /// Distance in the image within which two landmarks are taken to be at one depth, of an image 640
 /// wide [px]. Cost: farther, more of them lie on other surfaces, which shows in the spread.
 constexpr double kNeighbourPx = 80.0;
-/// Relative standard deviation of an inverse depth that is compared. Derivation: infinity is five
-/// sigma away.
-constexpr double kMostDepthSigma = 0.2;
-/// Derivation: the fewest whose median two outliers can't move away.
-constexpr std::size_t kLeastNeighbours = 5;
 /// Of the standard deviation of a Gaussian, its median absolute deviation, and of the mean's the
 /// median's, as they are for Gaussians.
 constexpr double kDeviationsOfMedian = 1.4826, kMedianOverMean = 1.2533;
-/// Noise of a landmark's match per axis [px] at least. Derivation: that of matches to a pixel, of
-/// templates that were taken long ago.
-constexpr double kLeastJoinSigmaPx = 1.0;
 /// Cost: of one right pair of looks in ten thousand another is taken.
 constexpr double kAgreementProbability = 0.9999;
 
@@ -44,24 +36,12 @@ void addLogDistance(const Ekf& filter, const FeatureState& feature, double weigh
   gradient->segment<3>(CameraError::kPosition) -= slope;
 }
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-
-/// Position and rotation of a camera that was found, in its own frame, by the noise of the pixels.
+/// Of a camera that was found in a map, in its own frame.
 Matrix6 covarianceInCamera(const CameraModel& camera, const Ekf& map, const Relocalisation& found) {
-  Matrix6 information = Matrix6::Zero();
-  for (const FeatureMeasurement& inlier : found.inliers) {
-    const FeatureState* feature = map.find(inlier.id);
-    if (!feature) continue;
-    const Eigen::Vector3d point = found.T_world_camera.inverse() * feature->position();
-    Eigen::Matrix<double, 2, 3> d_pixel;
-    if (!camera.project(point, &d_pixel)) continue;
-    Eigen::Matrix<double, 2, 6> J;
-    J << -d_pixel, d_pixel * skew(point);
-    information += J.transpose() * J;
-  }
-  const double sigma_px = std::max(found.rms_px / std::sqrt(2.0), kLeastJoinSigmaPx);
-  return sigma_px * sigma_px * information.ldlt().solve(Matrix6::Identity());
+  std::vector<Eigen::Vector3d> points;
+  for (const FeatureMeasurement& inlier : found.inliers)
+    if (const FeatureState* feature = map.find(inlier.id)) points.push_back(feature->position());
+  return foundPoseCovariance(camera, found, points);
 }
 
 /// Of positions and rotations, those of a camera in which another has a relative pose, by errors in
@@ -87,7 +67,7 @@ std::optional<UnitRatio> unitRatio(const CameraModel& camera, const Ekf& map, co
   std::vector<Seen> seen;
   const Eigen::Isometry3d T_camera_other = other.camera().poseWorldCamera().inverse();
   for (const FeatureState& feature : other.features()) {
-    if (other.sigmaInverseDepth(feature) > kMostDepthSigma * std::abs(feature.inverse_depth))
+    if (other.sigmaInverseDepth(feature) > kKnownDepthSigma * std::abs(feature.inverse_depth))
       continue;
     const Eigen::Vector3d point = T_camera_other * feature.position();
     const auto pixel = camera.project(point);
@@ -111,7 +91,7 @@ std::optional<UnitRatio> unitRatio(const CameraModel& camera, const Ekf& map, co
     if ((nearest->pixel - sight.pixel).norm() > radius_px || !(distance > 0.0)) continue;
     pairs.push_back({feature, nearest->feature, std::log(distance / nearest->distance)});
   }
-  if (pairs.size() < kLeastNeighbours) return std::nullopt;
+  if (static_cast<std::ptrdiff_t>(pairs.size()) < kNeighbours) return std::nullopt;
   std::vector<double> ratios, deviations;
   for (const Pair& pair : pairs) ratios.push_back(pair.log_ratio);
   const double median = medianOf(ratios);
@@ -145,11 +125,9 @@ bool agree(const CameraModel& camera, const Ekf& map, const Relocalisation& firs
   const Eigen::Vector3d along =
       unit.log_sigma * (expected.linear().transpose() * expected.translation());
   covariance.topLeftCorner<3, 3>() += along * along.transpose();
-  const Eigen::LLT<Matrix6> factor(covariance);
   constexpr int kFreedoms = 6;
-  return factor.info() == Eigen::Success && difference.allFinite() &&
-         difference.dot(factor.solve(difference)) <=
-             chiSquareQuantile(kFreedoms, kAgreementProbability);
+  return squaredDistance(difference, covariance) <=
+         chiSquareQuantile(kFreedoms, kAgreementProbability);
 }
 
 JoinedFeatures joinFeatures(const Ekf& other, const std::vector<FeatureId>& ids,

@@ -37,9 +37,8 @@ constexpr double kClockStep_s = 1.0;
 
 /// What a Tracker does, stage by stage. The stages stand in files of their own: tracker.cpp (the
 /// way of a frame), tracker_start.cpp, tracker_match.cpp, tracker_map.cpp, tracker_submaps.cpp,
-/// tracker_lost.cpp,
-/// tracker_look.cpp and tracked_frame.cpp. What is known of the frame in hand is passed from one to
-/// the next (FrameState); members hold what lasts.
+/// tracker_lost.cpp, tracker_look.cpp and tracked_frame.cpp. What is known of the frame in hand is
+/// passed from one to the next (FrameState); members hold what lasts.
 class Tracker::Implementation {
  public:
   Implementation(const CameraModel& camera, const TrackerOptions& options)
@@ -131,6 +130,7 @@ class Tracker::Implementation {
   bool watchLoop(TrackedFrame* frame);
   bool leaveOutImageFixed(const FrameState& current, TrackedFrame* frame);
   void retakePatches(const FrameState& current);
+  std::vector<Eigen::Vector2d> occupiedPixels() const;
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);
   void retire(const std::vector<FeatureId>& ids, TrackedFrame* frame);
@@ -211,6 +211,7 @@ class Tracker::Implementation {
   void endPlace();
   std::vector<Landmark> landmarksOf(const Place& place) const;
   std::optional<Eigen::Isometry3d> continueLook(double milliseconds, double* spent_ms);
+  std::optional<Sighting> proveLook(double milliseconds);
   std::vector<Place> placesWhileLost();
   bool lookWhileLost(const cv::Mat& image, LookBudget share, double interval_s,
                      TrackedFrame* frame);

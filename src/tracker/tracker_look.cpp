@@ -99,6 +99,29 @@ std::optional<Eigen::Isometry3d> Tracker::Implementation::continueLook(double mi
   return std::nullopt;
 }
 
+/// Goes on with the look in hand. Where a pose is proven in the image that is searched, the look is
+/// at its end.
+std::optional<Tracker::Implementation::Sighting> Tracker::Implementation::proveLook(
+    double milliseconds) {
+  double spent_ms = 0.0;
+  while (look_) {
+    const auto pose = continueLook(milliseconds, &spent_ms);
+    if (!pose) return std::nullopt;
+    const Place place = look_->places.back();
+    const std::vector<Landmark> landmarks = landmarksOf(place);
+    spent_ms += Relocaliser::proofMs(landmarks);
+    const cv::Mat searched = look_->look.image();
+    auto found = relocaliser_.prove(camera_, searched, landmarks, *pose, look_->look.mask());
+    const double stamp_s = look_->stamp_s;
+    const Eigen::Isometry3d T_world_camera = look_->T_world_camera;
+    endPlace();
+    if (!found) continue;
+    look_.reset();
+    return Sighting{place, *std::move(found), searched, stamp_s, T_world_camera};
+  }
+  return std::nullopt;
+}
+
 /// The map in hand, some of its submaps in turn, and the other maps.
 std::vector<Tracker::Implementation::Place> Tracker::Implementation::placesWhileLost() {
   std::vector<Place> places;
@@ -124,29 +147,11 @@ bool Tracker::Implementation::lookWhileLost(const cv::Mat& image, LookBudget sha
     return false;
   }
   if (!look_) beginLook(OngoingLook::Purpose::kLost, image, placesWhileLost());
-  const double milliseconds = lookMilliseconds(share, interval_s);
-  double spent_ms = 0.0;
-  while (look_) {
-    const auto pose = continueLook(milliseconds, &spent_ms);
-    if (!pose) return false;
-    const Place place = look_->places.back();
-    const std::vector<Landmark> landmarks = landmarksOf(place);
-    spent_ms += Relocaliser::proofMs(landmarks);
-    const cv::Mat searched = look_->look.image();
-    const auto found = relocaliser_.prove(camera_, searched, landmarks, *pose, look_->look.mask());
-    const double stamp_s = look_->stamp_s;
-    const Eigen::Isometry3d T_world_camera = look_->T_world_camera;
-    endPlace();
-    if (!found) continue;
-    look_.reset();
-    if (stamp_s == last_stamp_s_) {
-      goOnIn(place, *found, frame);
-      return true;
-    }
-    sighting_ = Sighting{place, *found, searched, stamp_s, T_world_camera};
-    return false;
-  }
-  return false;
+  sighting_ = proveLook(lookMilliseconds(share, interval_s));
+  if (!sighting_ || sighting_->stamp_s != last_stamp_s_) return false;
+  const Sighting now = *std::exchange(sighting_, std::nullopt);
+  goOnIn(now.place, now.found, frame);
+  return true;
 }
 
 /// Where the camera is now that was found in an old image: as far from there as one of unknown
@@ -246,23 +251,8 @@ bool Tracker::Implementation::lookForOtherMaps(const cv::Mat& image, double inte
     for (const LostMap& lost : lost_maps_) places.push_back({Place::Kind::kLostMap, lost.number});
     beginLook(OngoingLook::Purpose::kOtherMap, image, std::move(places));
   }
-  const double milliseconds = lookMilliseconds(LookBudget::kQuarter, interval_s);
-  double spent_ms = 0.0;
-  while (look_ && look_->purpose == OngoingLook::Purpose::kOtherMap) {
-    const auto pose = continueLook(milliseconds, &spent_ms);
-    if (!pose) return false;
-    const Place place = look_->places.back();
-    const std::vector<Landmark> landmarks = landmarksOf(place);
-    spent_ms += Relocaliser::proofMs(landmarks);
-    const cv::Mat searched = look_->look.image();
-    auto found = relocaliser_.prove(camera_, searched, landmarks, *pose, look_->look.mask());
-    const double stamp_s = look_->stamp_s;
-    const Eigen::Isometry3d T_world_camera = look_->T_world_camera;
-    endPlace();
-    if (!found) continue;
-    look_.reset();
-    sighting_ = Sighting{place, *std::move(found), searched, stamp_s, T_world_camera};
-  }
+  if (look_ && look_->purpose == OngoingLook::Purpose::kOtherMap)
+    sighting_ = proveLook(lookMilliseconds(LookBudget::kQuarter, interval_s));
   return false;
 }
 
@@ -336,11 +326,7 @@ void Tracker::Implementation::takeFeatures(const Ekf& other, const FeatureMap& o
                                            const UnitRatio& unit) {
   const double distance_px =
       0.5 * options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
-  std::vector<Eigen::Vector2d> occupied;
-  const Eigen::Isometry3d T_camera_world = filter_.camera().poseWorldCamera().inverse();
-  for (const FeatureState& feature : filter_.features())
-    if (const auto pixel = camera_.project(T_camera_world * feature.position()))
-      if (camera_.isInImage(*pixel)) occupied.push_back(*pixel);
+  const std::vector<Eigen::Vector2d> occupied = occupiedPixels();
   std::vector<std::pair<bool, FeatureId>> candidates;  // out of view; those are last
   const Eigen::Isometry3d T_camera_other = other.camera().poseWorldCamera().inverse();
   for (const MapFeature& feature : other_map.features()) {

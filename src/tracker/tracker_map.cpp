@@ -4,6 +4,7 @@
 #include "active_matching_slam/image/corners.h"
 #include "active_matching_slam/image/warp.h"
 #include "active_matching_slam/math/pixel_scale.h"
+#include "known_depth.h"
 #include "tracker_implementation.h"
 
 namespace active_matching_slam {
@@ -15,14 +16,8 @@ constexpr int kMaximumStartsPerFrame = 12;
 /// take the square of the number of features.
 constexpr std::size_t kLargeMap = 60;
 constexpr int kLargeMapSnapshotFrames = 5;
-/// Relative standard deviation of an inverse depth below which it counts as known. Derivation:
-/// infinity is five sigma away.
-constexpr double kKnownDepthSigma = 0.2;
 /// Features from which on a pose of their own fits them. Derivation: three points, P3P.
 constexpr std::size_t kFeaturesOfPose = 3;
-/// Whose median inverse depth a new feature takes. Derivation: the fewest whose median two outliers
-/// can't move away.
-constexpr std::ptrdiff_t kNeighbours = 5;
 
 }  // namespace
 
@@ -218,20 +213,25 @@ FeatureId Tracker::Implementation::addFeature(const Eigen::Vector2d& pixel,
   return id;
 }
 
+/// Where the map's features are in the image.
+std::vector<Eigen::Vector2d> Tracker::Implementation::occupiedPixels() const {
+  const Eigen::Isometry3d T_camera_world = filter_.camera().poseWorldCamera().inverse();
+  std::vector<Eigen::Vector2d> occupied;
+  for (const FeatureState& feature : filter_.features()) {
+    const Eigen::Vector4d point = homogeneousPosition(feature);
+    const auto pixel = camera_.project(T_camera_world.linear() * point.head<3>() +
+                                       point.w() * T_camera_world.translation());
+    if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
+  }
+  return occupied;
+}
+
 int Tracker::Implementation::startFeatures(const cv::Mat& image,
                                            const std::vector<VisibleFeature>& visible, int wanted,
                                            TrackedFrame* frame) {
   wanted = std::min(wanted, mostFeatures() - map_.size());
   if (wanted <= 0) return 0;
-  std::vector<Eigen::Vector2d> occupied;
-  for (const MapFeature& feature : map_.features()) {
-    const FeatureState* state = filter_.find(feature.id);
-    const Eigen::Vector4d point = homogeneousPosition(*state);
-    const Eigen::Isometry3d T_camera_world = filter_.camera().poseWorldCamera().inverse();
-    const auto pixel = camera_.project(T_camera_world.linear() * point.head<3>() +
-                                       point.w() * T_camera_world.translation());
-    if (pixel && camera_.isInImage(*pixel)) occupied.push_back(*pixel);
-  }
+  std::vector<Eigen::Vector2d> occupied = occupiedPixels();
   const std::vector<Eigen::Vector2d> frozen = frozenPixels();
   occupied.insert(occupied.end(), frozen.begin(), frozen.end());
   const std::vector<DepthSample> known_depths = knownDepths(visible);
@@ -239,7 +239,7 @@ int Tracker::Implementation::startFeatures(const cv::Mat& image,
       options_.map.minimum_distance_px * pixelScale(camera_.width(), camera_.height());
   int started = 0;
   std::vector<FeatureMeasurement> first_sights;
-  const cv::Mat centres = image_fixed_.sceneCentres(mask_.patchCentres(), options_.image);
+  const cv::Mat centres = image_fixed_.sceneCentres(mask_.patchCentres());
   for (const Corner& corner :
        detectCorners(image, occupied, wanted, distance_px, options_.image, centres)) {
     const auto patch = extractSourcePatch(image, corner.pixel, filter_.camera().poseWorldCamera(),
