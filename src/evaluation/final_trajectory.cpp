@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "active_matching_slam/math/quantile.h"
 #include "active_matching_slam/math/rotation.h"
@@ -114,6 +115,7 @@ std::optional<Isometry3d> resect(const std::vector<Vector3d>& points,
 }
 
 void FinalTrajectory::add(const TrackedFrame& frame) {
+  poses_.reset();
   if (frame.map != map_) {
     frames_.clear();
     loops_.clear();
@@ -144,7 +146,8 @@ void FinalTrajectory::add(const TrackedFrame& frame) {
   frames_.push_back(std::move(kept));
 }
 
-Trajectory FinalTrajectory::poses() const {
+const Trajectory& FinalTrajectory::poses() const {
+  if (poses_) return *poses_;
   Trajectory poses;
   std::vector<std::optional<Correction>> corrections;
   for (const Frame& frame : frames_) {
@@ -166,7 +169,7 @@ Trajectory FinalTrajectory::poses() const {
   const std::vector<Correction> all = filled(corrections, poses);
   for (std::size_t i = 0; i < poses.size(); ++i)
     poses[i].T_world_camera = corrected(poses[i].T_world_camera, all[i]);
-  return poses;
+  return poses_.emplace(std::move(poses));
 }
 
 }  // namespace active_matching_slam

@@ -20,8 +20,8 @@ namespace active_matching_slam {
 class FinalTrajectory {
  public:
   void add(const TrackedFrame& frame);
-  /// Of the frames tracked in the map of the last frame, in their order.
-  Trajectory poses() const;
+  /// Of the frames tracked in the map of the last frame, in their order. Made when first asked for.
+  const Trajectory& poses() const;
 
  private:
   struct Sighting {
@@ -36,6 +36,7 @@ class FinalTrajectory {
   std::unordered_map<FeatureId, Eigen::Vector3d> positions_;  ///< in the last frame
   int map_ = -1;
   std::vector<std::size_t> loops_;  ///< frames before each that was closed and not taken back
+  mutable std::optional<Trajectory> poses_;  ///< since the last frame was added
 };
 
 /// The camera that sees `points` in `directions` (unit, camera's frame), from near `start`: least

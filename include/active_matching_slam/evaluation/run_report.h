@@ -23,7 +23,7 @@ class RunReport {
   const RunTruth& truth() const { return truth_; }
   Trajectory trajectory() const { return trackedTrajectory(records_); }
   /// In the map as it ends.
-  Trajectory finalTrajectory() const { return final_.poses(); }
+  const Trajectory& finalTrajectory() const { return final_.poses(); }
   RunSummary summary() const;
 
   /// Where the features of the run were last estimated, retired ones included, but those whose
