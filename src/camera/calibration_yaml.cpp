@@ -85,7 +85,7 @@ std::string cameraOfKalibr(const YAML::Node& root) {
     const auto name = entry.first.as<std::string>();
     if (name == "cam0" ||
         (first.empty() && name.rfind("cam", 0) == 0 && entry.second["intrinsics"]))
-      first = name == "cam0" || first.empty() ? name : first;
+      first = name;
   }
   return first;
 }

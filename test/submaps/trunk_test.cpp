@@ -28,6 +28,18 @@ MatrixXd orderedCovariance(const PlainActiveMap& map) {
   return selectBlock(map.covariance(), rows, rows);
 }
 
+/// A point that hangs on another.
+Conditional newPoint(FeatureId id, FeatureId given, test::RandomNumbers& random) {
+  Conditional point;
+  point.ids = {id};
+  point.given_ids = {given};
+  point.mean = random.matrix(3, 1);
+  point.given_mean = random.matrix(test::kCalibration + 3, 1);
+  point.K = random.matrix(3, test::kCalibration + 3);
+  point.Q = MatrixXd::Identity(3, 3);
+  return point;
+}
+
 TEST(Trunk, PointsComeBackAsTheyLeft) {
   const PlainActiveMap before = test::randomMap(12, idsFrom(0, 4), 1);
   PlainActiveMap map = before;
@@ -64,13 +76,7 @@ TEST(Trunk, APointOfWhichItKnowsNothingLeavesItAsItWas) {
   SubmapTree tree;
   tree.rest(map, {8, 9});
   test::RandomNumbers random(6);
-  Conditional fresh;
-  fresh.ids = {50};
-  fresh.given_ids = {1};
-  fresh.mean = random.matrix(3, 1);
-  fresh.given_mean = random.matrix(test::kCalibration + 3, 1);
-  fresh.K = random.matrix(3, test::kCalibration + 3);
-  fresh.Q = MatrixXd::Identity(3, 3);
+  const Conditional fresh = newPoint(50, 1, random);
   map.insert(fresh);
   EXPECT_TRUE(tree.trunk().dependsOn(0));
   EXPECT_FALSE(tree.trunk().dependsOn(50));
@@ -113,13 +119,7 @@ TEST(Trunk, EqualsThePlainFilterWhateverHappensInBetween) {
     tree.rest(map, {8, 9, 10});
     frames(5, {0, 2, 5});
     // A new point, and one that goes for good.
-    Conditional fresh;
-    fresh.ids = {50};
-    fresh.given_ids = {1};
-    fresh.mean = random.matrix(3, 1);
-    fresh.given_mean = random.matrix(test::kCalibration + 3, 1);
-    fresh.K = random.matrix(3, test::kCalibration + 3);
-    fresh.Q = MatrixXd::Identity(3, 3);
+    const Conditional fresh = newPoint(50, 1, random);
     map.insert(fresh);
     plain.insert(fresh);
     tree.remove(map, {7});
