@@ -8,7 +8,6 @@
 // reduced.
 
 #include <benchmark/benchmark.h>
-#include <time.h>
 
 #include <algorithm>
 #include <map>
@@ -19,16 +18,10 @@
 
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "thread_seconds.h"
 
 namespace active_matching_slam {
 namespace {
-
-/// Seconds of this thread: what a core spent, whoever else was busy.
-double threadSeconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 struct Sequence {
   CameraModel camera;

@@ -1,16 +1,21 @@
 // Cost of a relocalisation attempt in the whole map: where the place is found, and where it is not.
-// Maps of about 60 and 150 features, 320 x 240 and 640 x 480 pixels.
+// Maps of about 60 and 150 features, 320 x 240 and 640 x 480 pixels. Cases `step/...`: the parts
+// into which a look is cut; their modelled time, by which the tracker spreads them over frames,
+// over the measured, and the longest.
 
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <stdexcept>
 
 #include "active_matching_slam/map/map_file.h"
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "thread_seconds.h"
 
 namespace active_matching_slam {
 namespace {
@@ -43,20 +48,65 @@ MapFileContent trackedMap(Simulator* simulator, int features) {
   return content;
 }
 
-void look(benchmark::State& state, const std::string& scene) {
-  const int width = static_cast<int>(state.range(0));
-  Simulator room(filmOptions("room", width)), other(filmOptions(scene, width));
-  const MapFileContent content = trackedMap(&room, static_cast<int>(state.range(1)));
+/// A map of a room, and an image that was taken in it, or elsewhere.
+struct LookProblem {
+  LookProblem(const benchmark::State& state, const std::string& scene)
+      : room(filmOptions("room", static_cast<int>(state.range(0)))),
+        content(trackedMap(&room, static_cast<int>(state.range(1)))) {
+    filter.restore(content.camera_state, content.features, content.covariance, content.next_id);
+    for (const MapFeature& feature : content.map) map.add(feature);
+    Simulator other(filmOptions(scene, static_cast<int>(state.range(0))));
+    image = scene == "room" ? room.next()->image : other.next()->image;
+  }
+
+  Simulator room;
+  MapFileContent content;
   Ekf filter{FilterOptions()};
-  filter.restore(content.camera_state, content.features, content.covariance, content.next_id);
   FeatureMap map;
-  for (const MapFeature& feature : content.map) map.add(feature);
-  const Relocaliser relocaliser({}, {}, {});
-  const cv::Mat image = scene == "room" ? room.next()->image : other.next()->image;
+  const Relocaliser relocaliser{{}, {}, {}};
+  cv::Mat image;
+};
+
+void look(benchmark::State& state, const std::string& scene) {
+  const LookProblem problem(state, scene);
   bool found = false;
-  for (auto _ : state) found = relocaliser.find(room.camera(), image, filter, map).has_value();
-  state.counters["features"] = map.size();
+  for (auto _ : state)
+    found =
+        problem.relocaliser.find(problem.room.camera(), problem.image, problem.filter, problem.map)
+            .has_value();
+  state.counters["features"] = problem.map.size();
   state.counters["found"] = found;
+}
+
+void steps(benchmark::State& state, const std::string& scene) {
+  const LookProblem problem(state, scene);
+  const Relocaliser& relocaliser = problem.relocaliser;
+  const CameraModel& camera = problem.room.camera();
+  const std::vector<Landmark> landmarks = relocaliser.usableLandmarks(problem.filter, problem.map);
+  double modelled_ms = 0.0, measured_ms = 0.0, longest_ms = 0.0;
+  const auto measure = [&](double modelled, const std::function<void()>& work) {
+    const double start = threadSeconds();
+    work();
+    const double spent_ms = 1e3 * (threadSeconds() - start);
+    modelled_ms += modelled;
+    measured_ms += spent_ms;
+    longest_ms = std::max(longest_ms, spent_ms);
+  };
+  int count = 0;
+  for (auto _ : state) {
+    CameraLook look(problem.image, {});
+    for (count = 0; !look.isOver(); ++count)
+      measure(Relocaliser::stepMs(landmarks, look),
+              [&] { relocaliser.step(camera, landmarks, &look); });
+    if (!look.pose()) continue;
+    measure(Relocaliser::proofMs(landmarks), [&] {
+      benchmark::DoNotOptimize(
+          relocaliser.prove(camera, problem.image, landmarks, *look.pose(), {}));
+    });
+  }
+  state.counters["steps"] = count;
+  state.counters["longest_ms"] = longest_ms;
+  state.counters["modelled"] = modelled_ms / measured_ms;
 }
 
 BENCHMARK_CAPTURE(look, found, "room")
@@ -68,6 +118,14 @@ BENCHMARK_CAPTURE(look, found, "room")
 BENCHMARK_CAPTURE(look, elsewhere, "office")
     ->Args({320, 40})
     ->Args({640, 40})
+    ->Args({320, 100})
+    ->Args({640, 100})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(steps, found, "room")
+    ->Args({320, 100})
+    ->Args({640, 100})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(steps, elsewhere, "office")
     ->Args({320, 100})
     ->Args({640, 100})
     ->Unit(benchmark::kMillisecond);
