@@ -249,6 +249,15 @@ Ids SubmapTree::activate(ActiveMap& active, int id) {
   return leaf.points.ids;
 }
 
+void SubmapTree::putBack(ActiveMap& active, const Leaf& leaf, const Ids& resting) {
+  remove(active, leaf.points.ids);
+  const auto place = std::lower_bound(leaves_.begin(), leaves_.end(), leaf.id,
+                                      [](const Leaf& a, int id) { return a.id < id; });
+  leaves_.insert(place, leaf);
+  pin(leaf, 1);
+  rest(active, resting);
+}
+
 void SubmapTree::activateTrunk(ActiveMap& active, const Ids& ids) {
   if (!ids.empty()) active.insert(trunk_.give(active.points(), ids));
 }

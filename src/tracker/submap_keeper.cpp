@@ -23,9 +23,6 @@ constexpr int kLeastLeaf = 20;
 constexpr double kRestS = 1.5;
 /// Between two times that features are laid aside [s]. Cost: it takes as long as some frames.
 constexpr double kFreezePeriodS = 1.0;
-/// Matches by which a submap that was made active has been found. Derivation: a pose takes three
-/// points; chance does not match as many again.
-constexpr int kFoundMatches = 6;
 
 /// log |P|; NaN where P is not positive definite.
 template <int kSize>
@@ -96,6 +93,11 @@ void SubmapKeeper::clear() {
 void SubmapKeeper::rescale(double factor) {
   tree_.rescale(factor);
   for (auto& [id, feature] : features_) feature.patch.T_world_camera.translation() *= factor;
+  if (trial_) {
+    trial_->leaf.points.rescale(factor);
+    for (MapFeature& feature : trial_->features)
+      feature.patch.T_world_camera.translation() *= factor;
+  }
   looked_from_.clear();
 }
 
@@ -119,31 +121,13 @@ void SubmapKeeper::observe(const std::vector<VisibleFeature>& visible,
   if (!isEnabled()) return;
   for (const VisibleFeature& feature : visible) last_in_view_s_[feature.id] = stamp_s;
   for (const FeatureId id : behind_mask) last_in_view_s_[id] = stamp_s;
-  for (const MapFeature& feature : map.features()) last_in_view_s_.emplace(feature.id, stamp_s);
-  const auto isOver = [&](Returned& returned) {
-    int matched = 0, left = 0;
-    std::size_t missed = 0;
-    for (const auto& [id, successes] : returned.successes) {
-      const MapFeature* feature = map.find(id);
-      if (!feature) continue;
-      ++left;
-      if (feature->successes > successes) ++matched;
-      missed += mistrusted_.count(id);
-    }
-    const bool is_found = matched >= kFoundMatches;
-    if (!returned.is_judged && (is_found || missed >= kLeastInView)) {
-      ++(is_found ? found_where_predicted_ : missed_where_predicted_);
-      returned.is_judged = true;
-    }
-    return is_found || left == 0;
-  };
-  returned_.erase(std::remove_if(returned_.begin(), returned_.end(), isOver), returned_.end());
+  for (const MapFeature& feature : map.features()) {
+    last_in_view_s_.emplace(feature.id, stamp_s);
+    if (isPinned(feature.id) && isResting(feature.id, stamp_s)) waiting_.insert(feature.id);
+  }
 }
 
-void SubmapKeeper::trust() {
-  mistrusted_.clear();
-  for (Returned& returned : returned_) returned.is_judged = true;  // they were found by a look
-}
+void SubmapKeeper::trust() { missed_.clear(); }
 
 std::vector<FeatureId> SubmapKeeper::remove(const std::vector<FeatureId>& ids, Ekf* filter,
                                             const FeatureMap& map) {
@@ -151,11 +135,7 @@ std::vector<FeatureId> SubmapKeeper::remove(const std::vector<FeatureId>& ids, E
   for (const FeatureId id : ids) {
     const FeatureState* state = filter->find(id);
     if (!state || !map.find(id)) continue;
-    const bool is_on_trial =
-        std::any_of(returned_.begin(), returned_.end(),
-                    [id](const Returned& returned) { return returned.successes.count(id) > 0; });
-    if (is_on_trial) mistrusted_.insert(id);
-    if (is_on_trial || isPinned(id)) {
+    if (isOnTrial(id) || isPinned(id)) {
       unsearched_.insert(id);
       continue;
     }
@@ -201,6 +181,7 @@ void SubmapKeeper::exchange(double stamp_s, Ekf* filter, FeatureMap* map) {
     if (!filter->find(feature.id)) gone.push_back(feature.id);
   for (MapFeature& feature : map->take(gone)) {
     last_in_view_s_.erase(feature.id);
+    waiting_.erase(feature.id);
     features_.insert_or_assign(feature.id, std::move(feature));
   }
   for (auto it = features_.begin(); it != features_.end();) {
@@ -217,7 +198,7 @@ void SubmapKeeper::exchange(double stamp_s, Ekf* filter, FeatureMap* map) {
 }
 
 bool SubmapKeeper::layAside(double stamp_s, Ekf* filter, FeatureMap* map) {
-  if (!isEnabled() || stamp_s - last_freeze_s_ < kFreezePeriodS ||
+  if (!isEnabled() || trial_ || stamp_s - last_freeze_s_ < kFreezePeriodS ||
       static_cast<int>(tree_.trunk().ids().size()) >= options_.trunk_features)
     return false;
   const std::vector<FeatureId> resting = candidates(stamp_s, *filter, *map);
@@ -247,7 +228,7 @@ bool SubmapKeeper::layAside(double stamp_s, Ekf* filter, FeatureMap* map) {
 }
 
 void SubmapKeeper::restSeparators(double stamp_s, Ekf* filter, FeatureMap* map) {
-  if (!isEnabled() || stamp_s - last_rest_s_ < kFreezePeriodS) return;
+  if (!isEnabled() || trial_ || stamp_s - last_rest_s_ < kFreezePeriodS) return;
   std::vector<FeatureId> resting;
   for (const MapFeature& feature : map->features())
     if (isPinned(feature.id) && !feature.known && isResting(feature.id, stamp_s))
@@ -274,12 +255,8 @@ bool SubmapKeeper::activate(int leaf, double stamp_s, int most_features, Ekf* fi
   EkfActiveMap active(*filter);
   const std::vector<FeatureId> ids = tree_.activate(active, leaf);
   exchange(stamp_s, filter, map);
-  Returned returned;
-  for (const FeatureId id : ids) {
-    unsearched_.erase(id);
-    returned.successes[id] = map->find(id)->successes;
-  }
-  returned_.push_back(std::move(returned));
+  for (const FeatureId id : ids) unsearched_.erase(id);
+  last_returned_ = ids;
   ++found_;
   return true;
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <unordered_map>
 #include <vector>
@@ -50,14 +51,17 @@ class SubmapKeeper {
   void observe(const std::vector<VisibleFeature>& visible,
                const std::vector<FeatureId>& behind_mask, const FeatureMap& map, double stamp_s);
 
-  /// Active features that stay, as separators or for another look, though they fail to match.
-  bool isUnsearched(FeatureId id) const { return unsearched_.count(id) > 0; }
+  /// Active features that stay, as separators or for another look, though they fail to match, and
+  /// separators that have been out of view for a while: until a submap is found beside them.
+  bool isUnsearched(FeatureId id) const {
+    return unsearched_.count(id) > 0 || waiting_.count(id) > 0;
+  }
 
   /// Of features that are to leave the map for good, those that may: the others are kept, and no
   /// longer searched. What is in the tree keeps what it knew through them.
   std::vector<FeatureId> remove(const std::vector<FeatureId>& ids, Ekf* filter,
                                 const FeatureMap& map);
-  bool isPinned(FeatureId id) const { return tree_.isSeparator(id); }
+  bool isPinned(FeatureId id) const;
 
   /// Lays aside a submap of features that have been out of view for a while, where there are
   /// enough. Whether it did.
@@ -75,12 +79,30 @@ class SubmapKeeper {
   /// The submap that may be searched as it is: enough of it should be in view, and it lies where it
   /// is predicted, relative to the camera. -1: none.
   int submapInView(const std::vector<FrozenView>& views, const Ekf& filter) const;
-  /// Separators of the trunk for which the same holds, where it is worth the while.
+  /// Separators of the trunk for which the same holds, where it is worth the while: beside a submap
+  /// that was found.
   std::vector<FeatureId> separatorsInView(const std::vector<FrozenView>& views,
                                           const Ekf& filter) const;
+  /// Whether the submap that was found last is still in view. Separators that wait are then
+  /// searched.
+  bool isPlaceKnown(const Ekf& filter, double stamp_s);
   /// Makes them active again. False, and nothing is changed, where the map, which may hold
   /// `most_features`, has no room for them.
   bool activate(int leaf, double stamp_s, int most_features, Ekf* filter, FeatureMap* map);
+  /// The same of a submap of which no image has told yet that it is where it is predicted. In a
+  /// wide gate chance makes matches too, and one that is followed from image to image would make
+  /// the filter sure of a wrong pose. So it is on trial first: its features are searched and their
+  /// matches are no measurements, until it is proven as the place of a lost camera is: of ten at
+  /// least most match. One that is missed is put back as it was, and looked for. One at a time;
+  /// meanwhile nothing is laid aside.
+  bool activateOnTrial(int leaf, double stamp_s, int most_features, Ekf* filter, FeatureMap* map);
+  bool hasTrial() const { return trial_.has_value(); }
+  bool isOnTrial(FeatureId id) const { return trial_ && trial_->is_matched.count(id) > 0; }
+  /// Which of its features were looked for in an image, and whether they matched.
+  void judgeTrial(const std::map<FeatureId, bool>& looked_for);
+  bool isTrialOver() const { return trial_ && trial_->images >= kTrialImages; }
+  /// Nothing where no submap is on trial.
+  void putBack(double stamp_s, Ekf* filter, FeatureMap* map);
   void activateSeparators(const std::vector<FeatureId>& ids, double stamp_s, Ekf* filter,
                           FeatureMap* map);
 
@@ -102,8 +124,7 @@ class SubmapKeeper {
   void movePatches(const std::map<FeatureId, Eigen::Vector3d>& before, const Ekf& filter);
   /// A loop was closed: what did not match where it was predicted may now.
   void trust();
-  /// Submaps that were made active since they should have been in view: so many were matched there,
-  /// so many were not, though most of what should be seen was searched in vain.
+  /// Of the submaps that were on trial, so many were found, and so many missed.
   int foundWherePredicted() const { return found_where_predicted_; }
   int missedWherePredicted() const { return missed_where_predicted_; }
 
@@ -119,9 +140,11 @@ class SubmapKeeper {
   static constexpr int kSlack = 30;
 
  private:
-  /// Features of a submap in view, for it to be searched, and missed for it to be missed.
-  /// Derivation: what a relocalisation must find (relocaliser/minimum_inliers).
+  /// Features of a submap in view, for it to be searched, and looked for, for it to be found or
+  /// missed. Derivation: what a relocalisation must find (relocaliser/minimum_inliers).
   static constexpr std::size_t kLeastInView = 10;
+  /// Images of a trial. Cost: one that is missed is looked for so much later.
+  static constexpr int kTrialImages = 10;
   /// Separators that go to the trunk or come back together at least. Cost: each time is a
   /// factorisation of the map's covariance.
   static constexpr std::size_t kLeastSeparators = 4;
@@ -132,19 +155,24 @@ class SubmapKeeper {
                        const Ekf& filter) const;
   std::vector<FeatureId> candidates(double stamp_s, const Ekf& filter, const FeatureMap& map) const;
 
-  /// A submap that was made active, and how often each of its features had been matched.
-  struct Returned {
-    std::map<FeatureId, int> successes;
-    bool is_judged = false;  ///< whether it was found where it was predicted
+  struct Trial {
+    Leaf leaf;
+    std::vector<MapFeature> features;  ///< of the leaf, as they were
+    std::vector<FeatureId> rested;     ///< of its separator, in the trunk before
+    /// Of these features, whether they matched when they were last looked for; empty: they were
+    /// not.
+    std::map<FeatureId, std::optional<bool>> is_matched;
+    int images = 0;
   };
 
   SubmapFilterOptions options_;
   SubmapTree tree_;
   std::map<FeatureId, MapFeature> features_;  ///< of the tree
   std::unordered_map<FeatureId, double> last_in_view_s_;
-  std::set<FeatureId> unsearched_;
-  std::set<FeatureId> mistrusted_;  ///< in leaves that did not match where they were predicted
-  std::vector<Returned> returned_;
+  std::set<FeatureId> unsearched_, waiting_;
+  std::set<int> missed_;                  ///< leaves that were not where they were predicted
+  std::vector<FeatureId> last_returned_;  ///< features of the submap that was found last
+  std::optional<Trial> trial_;
   std::vector<FeatureId> opened_;
   /// Of each leaf by its id: standard deviation of its middle relative to the camera, when that was
   /// last asked for, and by which count of looks it was looked for.

@@ -132,7 +132,7 @@ bool areSearchable(const std::vector<const FrozenView*>& views, const Conditiona
 int SubmapKeeper::submapInView(const std::vector<FrozenView>& views, const Ekf& filter) const {
   std::map<int, std::vector<const FrozenView*>> of_leaf;
   for (const FrozenView& view : views)
-    if (view.leaf >= 0 && mistrusted_.count(view.id) == 0) of_leaf[view.leaf].push_back(&view);
+    if (view.leaf >= 0 && missed_.count(view.leaf) == 0) of_leaf[view.leaf].push_back(&view);
   std::vector<std::pair<std::size_t, int>> most;
   for (const auto& [leaf, seen] : of_leaf)
     if (seen.size() >= kLeastInView) most.emplace_back(seen.size(), leaf);
@@ -145,12 +145,20 @@ int SubmapKeeper::submapInView(const std::vector<FrozenView>& views, const Ekf& 
   return areSearchable(some, points, filter) ? best : -1;
 }
 
+bool SubmapKeeper::isPlaceKnown(const Ekf& filter, double stamp_s) {
+  const bool is_known =
+      std::any_of(last_returned_.begin(), last_returned_.end(),
+                  [&](FeatureId id) { return filter.find(id) && !isResting(id, stamp_s); });
+  if (is_known) waiting_.clear();
+  return is_known;
+}
+
 std::vector<FeatureId> SubmapKeeper::separatorsInView(const std::vector<FrozenView>& views,
                                                       const Ekf& filter) const {
   std::vector<const FrozenView*> seen;
   std::vector<FeatureId> ids;
   for (const FrozenView& view : views) {
-    if (view.leaf >= 0 || unsearched_.count(view.id) > 0) continue;
+    if (view.leaf >= 0 || isUnsearched(view.id)) continue;
     seen.push_back(&view);
     ids.push_back(view.id);
   }
@@ -244,8 +252,8 @@ std::vector<int> SubmapKeeper::loopCandidates(const std::map<FeatureId, Eigen::V
     if (sigma == sigma_of_.end()) continue;
     const Middle middle = middleOf(leaf, positions);
     const double distance = (middle.centre - T_world_camera.translation()).norm();
-    const bool is_mistrusted = mistrusted_.count(middle.id) > 0;
-    if (3.0 * sigma->second <= kSearchableSigma3 * distance && !is_mistrusted) continue;
+    if (3.0 * sigma->second <= kSearchableSigma3 * distance && missed_.count(leaf.id) == 0)
+      continue;
     const auto last = looked_from_.find(leaf.id);
     if (last != looked_from_.end()) {
       const Eigen::Isometry3d T_last_now = last->second.inverse() * T_world_camera;

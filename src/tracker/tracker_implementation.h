@@ -130,6 +130,7 @@ class Tracker::Implementation {
   bool watchLoop(TrackedFrame* frame);
   bool leaveOutImageFixed(const FrameState& current, TrackedFrame* frame);
   void retakePatches(const FrameState& current);
+  void leaveOutTrial(FrameState* current);
   std::vector<Eigen::Vector2d> occupiedPixels() const;
   int startFeatures(const cv::Mat& image, const std::vector<VisibleFeature>& visible, int wanted,
                     TrackedFrame* frame);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -138,7 +139,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
     const FeatureId id = current.prior.ids[i];
     const MapFeature& feature = *map_.find(id);
     current.sources.push_back({feature.patch, current.candidates[i].view});
-    current.match_probabilities.push_back(feature.recent_rate);
+    current.match_probabilities.push_back(submaps_.isOnTrial(id) ? 0.0 : feature.recent_rate);
     current.in_reference.push_back(feature.last_matched_frame == reference_index_);
     if (options_.learn_rates)
       current.prior.rates.push_back(feature.rates.rates({options_.matching.default_rates}));
@@ -152,6 +153,7 @@ FrameState Tracker::Implementation::measure(const cv::Mat& image, double interva
 
 /// Updates the filter by the matches, and learns from them.
 void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) {
+  leaveOutTrial(current);
   current->measurements = selectMeasurements(*current);
   noise_.weigh([this](FeatureId id) { return initialiser_.isAdjusting(id); }, map_,
                &current->measurements);
@@ -183,6 +185,30 @@ void Tracker::Implementation::correct(FrameState* current, TrackedFrame* frame) 
   if (!are_depths_guessed && !frame->repeated_image) judgeQuality(*current);
 }
 
+/// Lets the image tell whether a submap that is on trial is where it was predicted, unless it tells
+/// little of the rest either. Until it is, none of its features is an inlier.
+void Tracker::Implementation::leaveOutTrial(FrameState* current) {
+  if (!submaps_.hasTrial()) return;
+  std::map<FeatureId, bool> on_trial;
+  int others = 0, others_matched = 0;
+  for (int i = 0; i < current->prior.size(); ++i) {
+    if (!current->isLookedFor(i)) continue;
+    const FeatureId id = current->prior.ids[i];
+    const bool is_matched = std::binary_search(current->inliers.begin(), current->inliers.end(), i);
+    if (submaps_.isOnTrial(id)) {
+      on_trial[id] = is_matched;
+    } else {
+      ++others;
+      others_matched += is_matched;
+    }
+  }
+  if (2 * others_matched >= others) submaps_.judgeTrial(on_trial);
+  const auto isLeftOut = [&](int i) { return submaps_.isOnTrial(current->prior.ids[i]); };
+  current->inliers.erase(
+      std::remove_if(current->inliers.begin(), current->inliers.end(), isLeftOut),
+      current->inliers.end());
+}
+
 /// The accepted matches that pass the innovation gate, with the noise of their templates' fit.
 std::vector<FeatureMeasurement> Tracker::Implementation::selectMeasurements(
     const FrameState& current) {
@@ -211,7 +237,7 @@ void Tracker::Implementation::judgeQuality(const FrameState& current) {
   signs.matched = static_cast<int>(current.inliers.size());
   for (int i = 0; i < current.prior.size(); ++i) {
     const bool is_found = !current.search.matches(i).empty();
-    if (current.search.searchedPixels(i).size() == 0 ||
+    if (!current.isLookedFor(i) || submaps_.isOnTrial(current.prior.ids[i]) ||
         (!is_found && current.search.isPartlyMasked(i)))
       continue;
     ++signs.predicted;

@@ -45,17 +45,21 @@ void Tracker::Implementation::keepSubmaps(const TrackedFrame& frame) {
   submaps_.observe(visible, behind_mask, map_, last_stamp_s_);
   // Until the first images have been adjusted together, what they made of the map may be replaced.
   if (!initialiser_.isDone() || poor_frames_ > 0 || state_ != TrackingState::kTracking) return;
+  if (submaps_.isTrialOver()) submaps_.putBack(last_stamp_s_, &filter_, &map_);
   if (map_.size() + kRoomLeft > options_.map.maximum_features)
     submaps_.layAside(last_stamp_s_, &filter_, &map_);
   submaps_.restSeparators(last_stamp_s_, &filter_, &map_);
-  if (frame.index % kReactivationPeriodFrames != 0 || submaps_.tree().empty()) return;
+  if (frame.index % kReactivationPeriodFrames != 0 || submaps_.tree().empty() ||
+      submaps_.hasTrial())
+    return;
   const std::vector<FrozenView> views = submaps_.visible(
       submaps_.positions(filter_), filter_, camera_, options_.map, options_.image.border_px);
   const int submap = submaps_.submapInView(views, filter_);
   if (submap >= 0) {
-    submaps_.activate(submap, last_stamp_s_, options_.map.maximum_features, &filter_, &map_);
+    submaps_.activateOnTrial(submap, last_stamp_s_, options_.map.maximum_features, &filter_, &map_);
     return;
   }
+  if (!submaps_.isPlaceKnown(filter_, last_stamp_s_)) return;
   const std::vector<FeatureId> separators = submaps_.separatorsInView(views, filter_);
   if (!separators.empty() && map_.size() + static_cast<int>(separators.size()) <=
                                  options_.map.maximum_features + SubmapKeeper::kSlack)
@@ -117,6 +121,7 @@ void Tracker::Implementation::lookForLoop(const cv::Mat& image, double interval_
 /// Makes the submap part of the active map and corrects all by where it shows the camera.
 void Tracker::Implementation::closeLoop(int submap, const Relocalisation& found,
                                         const CameraOffset& offset, TrackedFrame* frame) {
+  submaps_.putBack(last_stamp_s_, &filter_, &map_);
   LoopUndo undo{filter_, map_, submaps_, 0, 0.0, 0};
   const Eigen::Isometry3d before = filter_.camera().poseWorldCamera();
   std::vector<FeatureId> carried;

@@ -93,6 +93,37 @@ TEST(SubmapTree, ALeafWithAMarkovBlanketEqualsThePlainFilter) {
   }
 }
 
+TEST(SubmapTree, WhatIsPutBackLeavesAllAsIfItHadNeverCome) {
+  PlainActiveMap aside = test::randomMap(14, idsFrom(0, 4), 8);
+  SubmapTree tree;
+  tree.rest(aside, {4});
+  const int id = tree.freeze(aside, {8, 9, 10}, {5, 6, 7}, {5}, {});
+  tree.freeze(aside, {11, 12}, {6, 7}, {}, {});
+  PlainActiveMap map = aside;
+  SubmapTree visited = tree;
+  const Leaf leaf = *visited.find(id);
+  visited.activate(map, id);
+  test::RandomNumbers random(9);
+  for (int i = 0; i < 5; ++i) {
+    const test::RandomFrame frame = test::randomFrame({0, 2, 7, 13}, random);
+    run(frame, aside);
+    run(frame, map);
+  }
+  visited.putBack(map, leaf, {5});
+  ASSERT_EQ(visited.leaves().size(), tree.leaves().size());
+  EXPECT_EQ(visited.leaves()[0].id, id);
+  EXPECT_EQ(visited.leaves()[0].points.Q, leaf.points.Q);
+  EXPECT_EQ(visited.trunk().ids(), tree.trunk().ids());
+  for (FeatureId separator : {5, 6, 7}) EXPECT_TRUE(visited.isSeparator(separator));
+  EXPECT_LT(
+      (covarianceOf(map, {0, 1, 2, 3, 6, 7, 13}) - covarianceOf(aside, {0, 1, 2, 3, 6, 7, 13}))
+          .norm(),
+      1e-9 * aside.covariance().norm());
+  const PlainActiveMap one = unfolded(map, visited), other = unfolded(aside, tree);
+  EXPECT_LT((covarianceOf(one, idsFrom(0, 14)) - covarianceOf(other, idsFrom(0, 14))).norm(),
+            1e-9 * other.covariance().norm());
+}
+
 TEST(SubmapTree, LostBitsAreThoseOfTheWholeMap) {
   const PlainActiveMap before = test::randomMap(14, idsFrom(0, 4), 4);
   PlainActiveMap map = before;

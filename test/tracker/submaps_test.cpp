@@ -9,6 +9,7 @@
 #include <iterator>
 #include <set>
 
+#include "../../src/tracker/submap_keeper.h"
 #include "tracker/simulated_frames.h"
 
 namespace active_matching_slam {
@@ -145,6 +146,88 @@ TEST(TrackerSubmaps, AreSavedAndLoadedBitForBit) {
   const auto told = plain.track(wayFilm().frames[last].image, wayFilm().frames[last].stamp_s);
   EXPECT_FALSE(told->frozen);
   std::filesystem::remove(path);
+}
+
+/// What a tracker that has seen the film knows, and the first submap that it laid aside.
+class SubmapTrial : public testing::Test {
+ protected:
+  SubmapTrial() {
+    const std::string path =
+        testing::TempDir() + "/submap_trial_" + std::to_string(::getpid()) + ".map";
+    way().tracker.saveMap(path);
+    content_ = readMapFile(path);
+    std::filesystem::remove(path);
+    filter_.restore(content_.camera_state, content_.features, content_.covariance,
+                    content_.next_id);
+    for (const MapFeature& feature : content_.map) map_.add(feature);
+    SubmapFilterOptions options = submapOptions().submap_filter;
+    keeper_.setOptions(options);
+    keeper_.restore(content_);
+    leaf_ = keeper_.tree().leaves().front();
+    EXPECT_TRUE(keeper_.activateOnTrial(leaf_.id, kStampS, 1000, &filter_, &map_));
+  }
+
+  /// Of the submap's first ten features `matched` matched.
+  std::map<FeatureId, bool> tenOfWhich(int matched) const {
+    std::map<FeatureId, bool> looked_for;
+    for (int k = 0; k < 10; ++k) looked_for[leaf_.points.ids[k]] = k < matched;
+    return looked_for;
+  }
+
+  static constexpr double kStampS = 100.0;
+  MapFileContent content_;
+  Ekf filter_{FilterOptions()};
+  FeatureMap map_;
+  SubmapKeeper keeper_{SubmapFilterOptions()};
+  Leaf leaf_;
+};
+
+TEST_F(SubmapTrial, IsOverAsSoonAsMostOfItMatch) {
+  const int before = keeper_.describe(filter_)->found;
+  EXPECT_TRUE(keeper_.isOnTrial(leaf_.points.ids[0]));
+  keeper_.judgeTrial(tenOfWhich(5));
+  EXPECT_TRUE(keeper_.hasTrial()) << "half of ten may be chance";
+  keeper_.judgeTrial(tenOfWhich(6));
+  EXPECT_FALSE(keeper_.hasTrial());
+  EXPECT_EQ(keeper_.foundWherePredicted(), 1);
+  EXPECT_EQ(keeper_.describe(filter_)->found, before + 1);
+  EXPECT_NE(filter_.find(leaf_.points.ids[0]), nullptr);
+  keeper_.putBack(kStampS, &filter_, &map_);  // nothing is on trial
+  EXPECT_NE(filter_.find(leaf_.points.ids[0]), nullptr);
+}
+
+TEST_F(SubmapTrial, AFewMatchesAreNoProofHoweverOftenAndItIsPutBackAsItWas) {
+  int images = 0;
+  while (!keeper_.isTrialOver()) {
+    ASSERT_LT(images++, 100);
+    keeper_.judgeTrial(tenOfWhich(3));
+    EXPECT_TRUE(keeper_.isOnTrial(leaf_.points.ids[0]));
+  }
+  EXPECT_EQ(keeper_.missedWherePredicted(), 1);
+  EXPECT_EQ(keeper_.foundWherePredicted(), 0);
+  keeper_.putBack(kStampS, &filter_, &map_);
+  EXPECT_FALSE(keeper_.hasTrial());
+  MapFileContent after;
+  keeper_.save(filter_, &after);
+  ASSERT_EQ(after.submaps.size(), content_.submaps.size());
+  EXPECT_EQ(after.submaps[0].id, leaf_.id);
+  EXPECT_EQ(after.submaps[0].points.Q, leaf_.points.Q);
+  EXPECT_EQ(after.trunk.ids, content_.trunk.ids);
+  ASSERT_EQ(after.frozen.size(), content_.frozen.size());
+  for (std::size_t i = 0; i < after.frozen.size(); ++i) {
+    EXPECT_EQ(after.frozen[i].id, content_.frozen[i].id);
+    EXPECT_EQ(after.frozen[i].attempts, content_.frozen[i].attempts);
+  }
+  EXPECT_EQ(map_.size(), static_cast<int>(content_.map.size()));
+  EXPECT_LT((filter_.covariance() - content_.covariance).norm(), 1e-9 * content_.covariance.norm());
+}
+
+TEST_F(SubmapTrial, GoesAlongWhenTheUnitOfLengthChanges) {
+  filter_.rescale(2.0);
+  keeper_.rescale(2.0);
+  keeper_.putBack(kStampS, &filter_, &map_);
+  const Eigen::VectorXd expected = 2.0 * leaf_.points.mean;
+  EXPECT_LT((keeper_.tree().find(leaf_.id)->points.mean - expected).norm(), 1e-9);
 }
 
 TEST(TrackerSubmaps, TakeAnotherUnitOfLengthWithTheMap) {

@@ -64,6 +64,11 @@ class SubmapTree {
   /// A leaf and its separator back into the active map; the leaf is no more. Returns its points.
   std::vector<FeatureId> activate(ActiveMap& active, int leaf);
 
+  /// What activate() returned as it was, where nothing of it was measured since: exact, for its
+  /// points depend on the rest by the separator alone. `resting`: of the separator, back to the
+  /// trunk. In between the separator must neither leave nor be frozen.
+  void putBack(ActiveMap& active, const Leaf& leaf, const std::vector<FeatureId>& resting);
+
   /// Points of the trunk back into the active map.
   void activateTrunk(ActiveMap& active, const std::vector<FeatureId>& ids);
 
