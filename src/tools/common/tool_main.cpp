@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "active_matching_slam/math/blas_threads.h"
+#include "active_matching_slam/math/freed_memory.h"
 
 namespace active_matching_slam {
 namespace {
@@ -35,6 +36,7 @@ std::vector<boost::program_options::option> takeNumbers(std::vector<std::string>
 
 int runTool(const std::string& name, const std::function<int()>& run) {
   useSingleThreadedBlas();
+  keepFreedMemory();
   try {
     return run();
   } catch (const std::exception& error) {
