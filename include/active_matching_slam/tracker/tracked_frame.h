@@ -98,7 +98,7 @@ struct FrozenMap {
   int submaps = 0;                           ///< leaves
   int trunk_features = 0;
   double lost_bits = 0.0;     ///< by the leaves' links to the rest that were cut, their sum
-  int frozen = 0, found = 0;  ///< leaves so far, and how often one became active again
+  int frozen = 0, found = 0;  ///< leaves so far, and how often one was found again
 };
 
 /// Time spent in each stage of a frame [ms].
