@@ -4,9 +4,9 @@
 // by correlation, motion of a hand-held camera, clutter as the images give it (its rate is counted
 // and printed); `latch` cases have the stop rule on. Counters: median and 90th percentile of a
 // frame, time split, pixels, searches, most Gaussians, and the modelled time that budgets count,
-// over the measured. Cases
-// `plain/...` and `shortcut/...`: the thesis's formulas against the exact identities that replace
-// them. At the end the exponents of cost in the number of features, and each shortcut's gain.
+// over the measured. Cases `plain/...` and `shortcut/...`: the thesis's formulas against the exact
+// identities that replace them. At the end the exponents of cost in the number of features, and
+// each shortcut's gain.
 
 #include <benchmark/benchmark.h>
 

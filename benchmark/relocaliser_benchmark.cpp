@@ -1,20 +1,17 @@
 // Cost of a relocalisation attempt in the whole map: where the place is found, and where it is not.
-// Maps of about 60 and 150 features, 320 x 240 and 640 x 480 pixels. Cases `step/...`: the parts
+// Maps of about 60 and 150 features, 320 x 240 and 640 x 480 pixels. Cases `steps/...`: the parts
 // into which a look is cut; their modelled time, by which the tracker spreads them over frames,
 // over the measured, and the longest.
 
 #include <benchmark/benchmark.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <functional>
-#include <stdexcept>
 
-#include "active_matching_slam/map/map_file.h"
 #include "active_matching_slam/map/relocaliser.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "saved_map.h"
 #include "thread_seconds.h"
 
 namespace active_matching_slam {
@@ -38,14 +35,7 @@ MapFileContent trackedMap(Simulator* simulator, int features) {
     const auto frame = simulator->next();
     tracker.track(frame->image, frame->stamp_s);
   }
-  char path[] = "/tmp/relocaliser_benchmark_XXXXXX";
-  const int file = ::mkstemp(path);
-  if (file < 0) throw std::runtime_error("can't make a temporary file");
-  ::close(file);
-  tracker.saveMap(path);
-  MapFileContent content = readMapFile(path);
-  std::remove(path);
-  return content;
+  return savedMap(tracker);
 }
 
 /// A map of a room, and an image that was taken in it, or elsewhere.

@@ -5,18 +5,16 @@
 // and bytes of the map's file for each.
 
 #include <benchmark/benchmark.h>
-#include <unistd.h>
 
-#include <cstdio>
 #include <map>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "../src/tracker/submap_keeper.h"
-#include "active_matching_slam/map/map_file.h"
 #include "active_matching_slam/simulation/simulator.h"
 #include "active_matching_slam/tracker/tracker.h"
+#include "saved_map.h"
 
 namespace active_matching_slam {
 namespace {
@@ -45,13 +43,7 @@ const MapFileContent& walkedMap() {
     Simulator simulator(walkOptions());
     Tracker tracker(simulator.camera(), trackerOptions());
     while (const auto frame = simulator.next()) tracker.track(frame->image, frame->stamp_s);
-    char path[] = "/tmp/submap_benchmark_XXXXXX";
-    const int file = ::mkstemp(path);
-    if (file < 0) throw std::runtime_error("can't make a temporary file");
-    ::close(file);
-    tracker.saveMap(path);
-    MapFileContent read = readMapFile(path);
-    std::remove(path);
+    MapFileContent read = savedMap(tracker);
     if (read.submaps.empty()) throw std::runtime_error("nothing was laid aside");
     return read;
   }();
