@@ -143,6 +143,7 @@ std::vector<FeatureId> SubmapKeeper::remove(const std::vector<FeatureId>& ids, E
     (state->kind == FeatureKind::kPoint ? points : rays).push_back(id);
     last_in_view_s_.erase(id);
     unsearched_.erase(id);
+    waiting_.erase(id);
   }
   filter->removeFeatures(rays);
   if (tree_.trunk().empty()) {
@@ -240,8 +241,9 @@ void SubmapKeeper::restSeparators(double stamp_s, Ekf* filter, FeatureMap* map) 
   exchange(stamp_s, filter, map);
 }
 
-bool SubmapKeeper::activate(int leaf, double stamp_s, int most_features, Ekf* filter,
-                            FeatureMap* map) {
+/// Makes a submap active, whether it was found or not.
+bool SubmapKeeper::bringBack(int leaf, double stamp_s, int most_features, Ekf* filter,
+                             FeatureMap* map) {
   const Leaf* found = tree_.find(leaf);
   if (!found) return false;
   int added = static_cast<int>(found->points.ids.size());
@@ -256,8 +258,21 @@ bool SubmapKeeper::activate(int leaf, double stamp_s, int most_features, Ekf* fi
   const std::vector<FeatureId> ids = tree_.activate(active, leaf);
   exchange(stamp_s, filter, map);
   for (const FeatureId id : ids) unsearched_.erase(id);
+  return true;
+}
+
+void SubmapKeeper::countFound(const std::vector<FeatureId>& ids) {
   last_returned_ = ids;
   ++found_;
+}
+
+bool SubmapKeeper::activate(int leaf, double stamp_s, int most_features, Ekf* filter,
+                            FeatureMap* map) {
+  const Leaf* found = tree_.find(leaf);
+  if (!found) return false;
+  const std::vector<FeatureId> ids = found->points.ids;
+  if (!bringBack(leaf, stamp_s, most_features, filter, map)) return false;
+  countFound(ids);
   return true;
 }
 

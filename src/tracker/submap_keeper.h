@@ -83,9 +83,10 @@ class SubmapKeeper {
   /// that was found.
   std::vector<FeatureId> separatorsInView(const std::vector<FrozenView>& views,
                                           const Ekf& filter) const;
-  /// Whether the submap that was found last is still in view. Separators that wait are then
-  /// searched.
-  bool isPlaceKnown(const Ekf& filter, double stamp_s);
+  /// Whether the submap that was found last is still in view.
+  bool isPlaceKnown(const Ekf& filter, double stamp_s) const;
+  /// Separators that wait are searched again.
+  void searchWaiting() { waiting_.clear(); }
   /// Makes them active again. False, and nothing is changed, where the map, which may hold
   /// `most_features`, has no room for them.
   bool activate(int leaf, double stamp_s, int most_features, Ekf* filter, FeatureMap* map);
@@ -101,8 +102,9 @@ class SubmapKeeper {
   /// Which of its features were looked for in an image, and whether they matched.
   void judgeTrial(const std::map<FeatureId, bool>& looked_for);
   bool isTrialOver() const { return trial_ && trial_->images >= kTrialImages; }
-  /// Nothing where no submap is on trial.
+  /// Ends a trial, if there is one: the submap is laid aside as it was, and counts as missed.
   void putBack(double stamp_s, Ekf* filter, FeatureMap* map);
+  /// Separators of the trunk become active again.
   void activateSeparators(const std::vector<FeatureId>& ids, double stamp_s, Ekf* filter,
                           FeatureMap* map);
 
@@ -150,6 +152,8 @@ class SubmapKeeper {
   static constexpr std::size_t kLeastSeparators = 4;
 
   void exchange(double stamp_s, Ekf* filter, FeatureMap* map);
+  bool bringBack(int leaf, double stamp_s, int most_features, Ekf* filter, FeatureMap* map);
+  void countFound(const std::vector<FeatureId>& ids);
   bool isResting(FeatureId id, double stamp_s) const;
   double relativeSigma(const Leaf& leaf, FeatureId middle, const PointGaussian& active,
                        const Ekf& filter) const;
@@ -169,7 +173,8 @@ class SubmapKeeper {
   SubmapTree tree_;
   std::map<FeatureId, MapFeature> features_;  ///< of the tree
   std::unordered_map<FeatureId, double> last_in_view_s_;
-  std::set<FeatureId> unsearched_, waiting_;
+  std::set<FeatureId> unsearched_;        ///< failed to match, and stay
+  std::set<FeatureId> waiting_;           ///< separators out of view for a while
   std::set<int> missed_;                  ///< leaves that were not where they were predicted
   std::vector<FeatureId> last_returned_;  ///< features of the submap that was found last
   std::optional<Trial> trial_;

@@ -30,10 +30,7 @@ bool SubmapKeeper::activateOnTrial(int leaf, double stamp_s, int most_features, 
     trial.rested.push_back(id);
     trial.is_matched[id];
   }
-  const std::vector<FeatureId> last_returned = last_returned_;
-  if (!activate(leaf, stamp_s, most_features, filter, map)) return false;
-  --found_;
-  last_returned_ = last_returned;
+  if (!bringBack(leaf, stamp_s, most_features, filter, map)) return false;
   trial_ = std::move(trial);
   return true;
 }
@@ -49,8 +46,7 @@ void SubmapKeeper::judgeTrial(const std::map<FeatureId, bool>& looked_for) {
   if (all < kLeastInView) return;
   if (2 * matched > all) {
     ++found_where_predicted_;
-    ++found_;
-    last_returned_ = trial_->leaf.points.ids;
+    countFound(trial_->leaf.points.ids);
     for (const auto& [id, is_matched] : trial_->is_matched) unsearched_.erase(id);
     trial_.reset();
   } else if (isTrialOver()) {

@@ -145,12 +145,9 @@ int SubmapKeeper::submapInView(const std::vector<FrozenView>& views, const Ekf& 
   return areSearchable(some, points, filter) ? best : -1;
 }
 
-bool SubmapKeeper::isPlaceKnown(const Ekf& filter, double stamp_s) {
-  const bool is_known =
-      std::any_of(last_returned_.begin(), last_returned_.end(),
-                  [&](FeatureId id) { return filter.find(id) && !isResting(id, stamp_s); });
-  if (is_known) waiting_.clear();
-  return is_known;
+bool SubmapKeeper::isPlaceKnown(const Ekf& filter, double stamp_s) const {
+  return std::any_of(last_returned_.begin(), last_returned_.end(),
+                     [&](FeatureId id) { return filter.find(id) && !isResting(id, stamp_s); });
 }
 
 std::vector<FeatureId> SubmapKeeper::separatorsInView(const std::vector<FrozenView>& views,

@@ -60,6 +60,7 @@ void Tracker::Implementation::keepSubmaps(const TrackedFrame& frame) {
     return;
   }
   if (!submaps_.isPlaceKnown(filter_, last_stamp_s_)) return;
+  submaps_.searchWaiting();
   const std::vector<FeatureId> separators = submaps_.separatorsInView(views, filter_);
   if (!separators.empty() && map_.size() + static_cast<int>(separators.size()) <=
                                  options_.map.maximum_features + SubmapKeeper::kSlack)

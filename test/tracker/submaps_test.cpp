@@ -160,8 +160,6 @@ class SubmapTrial : public testing::Test {
     filter_.restore(content_.camera_state, content_.features, content_.covariance,
                     content_.next_id);
     for (const MapFeature& feature : content_.map) map_.add(feature);
-    SubmapFilterOptions options = submapOptions().submap_filter;
-    keeper_.setOptions(options);
     keeper_.restore(content_);
     leaf_ = keeper_.tree().leaves().front();
     EXPECT_TRUE(keeper_.activateOnTrial(leaf_.id, kStampS, 1000, &filter_, &map_));
@@ -178,7 +176,7 @@ class SubmapTrial : public testing::Test {
   MapFileContent content_;
   Ekf filter_{FilterOptions()};
   FeatureMap map_;
-  SubmapKeeper keeper_{SubmapFilterOptions()};
+  SubmapKeeper keeper_{submapOptions().submap_filter};
   Leaf leaf_;
 };
 
